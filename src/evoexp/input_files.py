@@ -30,9 +30,6 @@ _UNREADABLE = (ValueError, SyntaxError, TypeError, LookupError, tokenize.TokenEr
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
 """A number in the cell of a table."""
 
-_DECIMAL_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]{1,3})?")
-_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
-
 
 def read_bounded(path: str | Path, limit: int = MAX_INPUT) -> bytes:
     """Return the content of a regular file of at most `limit` bytes.
@@ -82,9 +79,7 @@ class TableRow(NamedTuple):
 def read_table(content: bytes) -> list[TableRow]:
     """Return the rows of a CSV file in UTF-8, all as long as the first; blank lines are left out.
 
-    Cells are separated by semicolons or tabs if the first line has some, else by commas. Between
-    semicolons or tabs, `1,5` is the number 1.5; it is refused where other numbers of the file have
-    points, or where it may be one of thousands.
+    Cells are separated by semicolons or tabs if the first line has some, else by commas.
 
     Raises:
         TableError: If it is no such file.
@@ -105,30 +100,10 @@ def read_table(content: bytes) -> list[TableRow]:
             rows.append(TableRow(reader.line_num, [cell.strip() for cell in cells]))
             if len(cells) != len(rows[0].cells):
                 must = f"{len(rows[0].cells)} cells, as in the first line"
-                if mark == "," and len(cells) > len(rows[0].cells):
-                    must += " (decimal commas need semicolons between cells)"
                 raise TableError(reader.line_num, must, len(cells))
     except csv.Error as error:
         raise TableError(reader.line_num, "a line of CSV", str(error)) from None
-    return rows if mark == "," else _with_points(rows)
-
-
-def _with_points(rows: list[TableRow]) -> list[TableRow]:
-    """Return rows with points for decimal commas, if these cannot be taken for anything else."""
-    with_point = [any("." in c and NUMBER.fullmatch(c) for c in row.cells) for row in rows]
-    changed = [row._replace(cells=list(row.cells)) for row in rows]
-    for column in range(len(rows[0].cells) if rows else 0):
-        cells = [row.cells[column] for row in rows]
-        commas = [k for k, cell in enumerate(cells) if _DECIMAL_COMMA.fullmatch(cell)]
-        if commas and any(with_point):
-            must = f"a number with a point, as in line {rows[with_point.index(True)].line}"
-            raise TableError(rows[commas[0]].line, must, cells[commas[0]])
-        if commas and all(_THOUSANDS.fullmatch(cells[k]) for k in commas):
-            must = "a number with a decimal point: this comma may part thousands"
-            raise TableError(rows[commas[0]].line, must, cells[commas[0]])
-        for k in commas:
-            changed[k].cells[column] = cells[k].replace(",", ".")
-    return changed
+    return rows
 
 
 def read_npy(content: bytes) -> NDArray[Any]:

@@ -14,17 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evoexp.batch.warm_kernels as warm_kernels_module
-from evoexp.batch import jobs, live_curves
+from evoexp.batch import jobs
 from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
-from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import DamagedStore
-from evoexp.store import log_reader
+from evoexp.store import summaries
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -97,7 +96,9 @@ def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     (directory.replicates / ".0007.mcap.1.tmp").touch()
     (directory.replicates / "00005.mcap").touch()  # no name of a log
     read_summaries(directory)
-    monkeypatch.setattr(log_reader, "read_summary", lambda path: pytest.fail(f"{path} is decoded"))
+    monkeypatch.setattr(
+        summaries, "read_summary", lambda path, _: pytest.fail(f"{path} is decoded")
+    )
     batch = new_batch(tmp_path, (faulty, 10))
     assert [job.replicate for job in batch.jobs] == [0, 5, 7, 8, 9]
     assert not batch.is_damaged
@@ -115,18 +116,6 @@ def test_a_condition_is_built_once_per_process(
     assert len(calls) == 1
     again = run_replicate(own, 2).content
     assert read_log(outcomes[2].content).content_digest == read_log(again).content_digest
-
-
-def test_a_batch_tells_how_its_replicates_converge(
-    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
-    (tmp_path / "curves").mkdir()
-    run(tmp_path / "outputs", (faulty, 1), curves=tmp_path / "curves")
-    (curve,) = read_curves(tmp_path / "curves")
-    log = read_log(RunDirectory(tmp_path / "outputs", faulty.id).log_path(0))
-    assert curve[:3] == (faulty.id, 0, log.summary.num_generations)
-    assert curve.costs[-1] == log.summary.best_cost
 
 
 def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(

@@ -12,10 +12,9 @@ import pytest
 from command_samples import SMALL, Evoexp, Said, with_manifest
 
 from evoexp import shipped
-from evoexp.commands import facts
-from evoexp.commands.facts import KEYS
+from evoexp.commands import show
 from evoexp.commands.list_ import EXPERIMENT_KEYS, RUN_KEYS
-from evoexp.commands.show import INDENT, MAX_LINES, screen
+from evoexp.commands.show import INDENT, KEYS, MAX_LINES, screen
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import description, options
 from evoexp.evolution.genetic_settings import GeneticSettings
@@ -49,7 +48,9 @@ def test_a_configuration_before_anything_ran(evoexp: Evoexp, outputs: Path, widt
     condition = compose.expand(PLANAR, only=["via-point GA"])[0].conditions[0].condition
     assert entries["condition"] == condition.id
     assert "via_point_ga 1" in entries["components"] and "genetic 1" in entries["components"]
-    assert "rana_planar, via-point GA, budget paper" in entries["origin"]  # no cap changed it
+    assert (
+        "experiment rana_planar, budget paper, label via-point GA" in entries["origin"]
+    )  # no cap changed it
     assert "ga=rana_planar" in entries["origin"]
     command = "evoexp run experiment=rana_planar budget=smoke"
     assert f"not run here; run it: {command}" in entries["result"]
@@ -79,13 +80,13 @@ def test_several_conditions_are_a_table_of_their_differences(evoexp: Evoexp, wid
 def test_a_stored_run_is_one_screen(evoexp: Evoexp, stored: Path, width: int) -> None:
     for run in find_runs(stored):
         entries = one_screen(evoexp("show", run.hash12), width)
-        assert f"stored in {run.path}".replace(" ", "") in re.sub(r"\s", "", entries["origin"])
+        assert f"directory {run.path}".replace(" ", "") in re.sub(r"\s", "", entries["origin"])
         rows = read_summaries(run)
         certified = int(rows["certified"].fillna(value=False).sum())
-        assert entries["verdict"].startswith(f"{certified} certified, {2 - certified} refuted")
-        assert f"best cost {rows['best_cost'].min():.6g} (replicate" in entries["result"]
+        assert entries["verdict"].startswith(f"certified {certified}, refuted {2 - certified}")
+        assert f"best cost {rows['best_cost'].min():.6g}, best replicate" in entries["result"]
     entries = one_screen(evoexp("show", *ONE), width)
-    assert "2 of 2 replicates done" in entries["result"]
+    assert "planned 2, done 2" in entries["result"]
     assert "python 3." in entries["environment"]
 
 
@@ -107,7 +108,7 @@ def test_another_revision_and_environment_are_pointed_out(
     monkeypatch.setattr(GeneticSettings, "revision", 2)
     found = sections(evoexp("show", run.hash12).out)
     assert "genetic 1 (here 2)" in found["components"]
-    assert "not as here: versions.numpy: was 1.0, now" in found["environment"]
+    assert "differences: versions.numpy: was 1.0, now" in found["environment"]
     assert "was revision 1, installed is 2" in found["note"]
 
 
@@ -161,7 +162,7 @@ SMOKE = ("experiment=rana_planar", "budget=smoke")
 
 
 def test_what_needs_an_extra_is_shown(evoexp: Evoexp, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(facts, "lacking", lambda config_json: "nsga2 needs pip install evoexp[…]")
+    monkeypatch.setattr(show, "lacking", lambda config_json: "nsga2 needs pip install evoexp[…]")
     assert evoexp("show", *SMOKE, "planner.num_new_trajectories=1000").code == 0
 
 
@@ -210,8 +211,8 @@ def test_a_shipped_condition_that_never_ran_here(
     row = Shipped("rana_planar", "random search", "smoke", condition.id, "0" * 32)
     monkeypatch.setattr(shipped, "shipped", lambda: (row,))
     out = evoexp("show", condition.id[:6]).out
-    head = f"condition    {condition.id}\nshipped as   rana_planar, random search, smoke\n"
-    assert out.startswith(head)
+    named = "experiment rana_planar, label random search, budget smoke"
+    assert out.startswith(f"condition    {condition.id}\nshipped as   {named}\n")
     assert "run it: evoexp run experiment=rana_planar budget=smoke --only 'random search'\n" in out
     assert "\ncontrol      random_search()\n" in out
     assert not outputs.exists()
@@ -261,7 +262,7 @@ def test_stored_runs(evoexp: Evoexp, stored: Path, width: int) -> None:
     assert "…" not in out and max(map(len, out.splitlines())) <= width
     rows = cells(out)
     assert list(rows) == [run.hash12 for run in runs]
-    assert [row[1:3] for row in rows.values()] == [["2", "1"], ["2", "0"], ["2", "0"]]
+    assert [row[1:3] for row in rows.values()] == [["2 of 8", "1"], *2 * [["2 of 2", "0"]]]
     assert "(changed)" in out and "via-point" in out
 
 
@@ -278,7 +279,8 @@ def test_damaged_runs_are_listed_beside_the_others(
     said = evoexp("list")
     rows = cells(said.out)
     assert said.code == 0 and list(rows) == [first.hash12, second.hash12, third.hash12]
-    assert [row[1] for row in rows.values()] == ["2", "1", "2"], "logs know what they are of"
+    done = [row[1] for row in rows.values()]
+    assert done == ["2 of 2", "1 of 2", "2 of 2"], "logs know what they are of"
     assert "config.json (damaged: its hash 44136fa355b3 is not the d" in rows[first.hash12][0]
     assert "0001.mcap (empty" in rows[second.hash12][0] and "0001.mcap (empty" in said.err
 

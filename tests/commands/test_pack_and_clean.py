@@ -46,7 +46,7 @@ def test_show_and_diff_look_into_an_archive(
     for more in ((), ("--all",)):
         said = evoexp("show", f"{packed}:{one.hash12[:6]}", *more)
         assert said.code == 0 and said.out.startswith(f"condition    {one.condition_id}")
-        assert f"stored in {packed}".replace(" ", "") in "".join(said.out.split())
+        assert f"directory {packed}".replace(" ", "") in "".join(said.out.split())
     names = {each["condition"] for each in json.loads(evoexp("show", str(packed), "--json").out)}
     assert names == {one.condition_id, two.condition_id}
     for other, code in ((one, 0), (two, 1)):
@@ -80,7 +80,7 @@ def test_the_texts_of_an_archive_are_shown_as_its_own(
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "elsewhere"))
     assert evoexp("report", str(tmp_path / "theirs.tar")).code == 0
     said = evoexp("show", run.hash12)
-    assert "out of theirs.tar, according to which this is:" in said.out
+    assert "taken from theirs.tar" in said.out
     assert "rm -rf" not in said.out and "[red]mine[/red]" in said.out
     RunDirectory(tmp_path / "elsewhere", run.condition_id).log_path(1).write_bytes(b"")
     for words in (("verify",), ("list",), ("show", run.hash12)):

@@ -104,7 +104,7 @@ def test_a_trajectory_of_others_is_shown_and_played(
     path = tmp_path / "theirs.csv"
     path.write_text(
         "time;arm_1_joint_1_deg;arm_1_joint_0_deg;arm_0_joint_0_deg;arm_0_joint_1_deg;gripper\n"
-        "0;10,5;10;180;90;1\n1;0;0;90;90;2\n"
+        "0;10.5;10;180;90;1\n1;0;0;90;90;2\n"
     )
     said = evoexp("evaluate", *SCENE, str(path))
     assert said.code == 0 and "straight lines between the points" in said.out

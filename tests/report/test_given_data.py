@@ -109,9 +109,9 @@ REFUSED = {
     f"{HEAD}\nA,p,1,inf,2.0": "line 2, queries: must be a whole number",
     f"{HEAD}\nA,p,nan,10,2.0": "line 2, seed: must be a whole number",
     f"{HEAD}\nA,p,0x1,10,2.0": "line 2, seed: must be a whole number",
-    f"{HEAD}\nA,p,1,10,1,5": "line 2: must be 5 cells, .* (decimal commas need semicolons",
-    f"{SEMICOLONS}\nA;p;0;10;1,5\nA;p;1;20;2.5": "line 2: must be a number with a point, as in",
-    f"{SEMICOLONS}\nA;p;0;1,000;1,5": "line 2: must be a number with a decimal point: .* thousands",
+    f"{HEAD}\nA,p,1,10,1,5": "line 2: must be 5 cells, as in the first line",
+    f"{SEMICOLONS}\nA;p;0;10;1,5": "line 2, cost: must be a length above 0",
+    f"{SEMICOLONS}\nA;p;0;1,000;1.5": "line 2, queries: must be a whole number",
     f"{HEAD}\nA,p,1,10,0": "line 2, cost: must be a length above 0, or empty .*, was '0'",
     f"{HEAD}\nA,p,1,10,-inf": "line 2, cost: must be a length above 0",
     f"{HEAD}\nA,p,1,10,nan": "line 2, cost: must be a length above 0",
@@ -132,9 +132,8 @@ def test_a_bad_row_is_named_by_line_and_column(tmp_path: Path, text: str, said: 
     ("text", "queries", "costs"),
     [
         (f"{HEAD}\nA,p,0,1e3,1.5\nA,p,1.0,12.0,inf\nA,p,2,1.5e1,Inf\n", [1000, 12, 15], 1),
-        (f"{SEMICOLONS}\nA;p;0;10;1,5\nA;p;1;20;2,125\n", [10, 20], 2),
         (f"{SEMICOLONS}\nA;p;0;10;1.5\n", [10], 1),
-        (HEAD.replace(",", "\t") + "\nA\tp\t0\t10\t1,5\n", [10], 1),
+        (HEAD.replace(",", "\t") + "\nA\tp\t0\t10\t1.5\n", [10], 1),
     ],
 )
 def test_numbers_may_be_written_as_spreadsheets_do(

@@ -165,7 +165,7 @@ HOSTILE: dict[str, dict[str, bytes]] = {  # the reason → what is wrong → the
         "a log in the place of another": packed(entry(LOG.replace("7.", "8."), CONTENT)),
     },
     "has another hash": {"another configuration": packed(before=(entry(f"{ROOT}/config.json"),))},
-    "comes before config.json": {"no configuration": packed(entry(LOG, CONTENT), before=())},
+    "is without config.json": {"no configuration": packed(entry(LOG, CONTENT), before=())},
     "no archive of runs (": {"a wrong checksum": b"x" + packed()[1:]},
     "it is empty": {"no run": bytes(1024)},
     **{

@@ -29,8 +29,7 @@ from mcap.records import Attachment, Metadata
 from store_samples import generations, write
 
 from confinement import confined, no_longer
-from evoexp.commands.facts import log_facts
-from evoexp.commands.show import screen
+from evoexp.commands.show import log_facts, screen
 from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.records import FrontRow
 from evoexp.store import log_bounds, log_reader

@@ -15,7 +15,7 @@ from store_samples import CONDITION, generations, write
 
 from evoexp.errors import DamagedStore
 from evoexp.records import ReplicateSummary
-from evoexp.store import log_reader, summaries, tables
+from evoexp.store import summaries, tables
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import whole_logs, write_summary
@@ -32,10 +32,10 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def noted(module: object, name: str) -> None:
         read = getattr(module, name)
-        note = lambda path: replicates.append(int(path.stem)) or read(path)  # noqa: E731
+        note = lambda path, *own: replicates.append(int(path.stem)) or read(path, *own)  # noqa: E731
         monkeypatch.setattr(module, name, note)
 
-    noted(log_reader, "read_summary")
+    noted(summaries, "read_summary")
     noted(tables, "generation_columns")
     return replicates
 

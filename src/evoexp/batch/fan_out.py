@@ -3,7 +3,6 @@
 from collections import deque
 from collections.abc import Iterator, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
@@ -19,7 +18,6 @@ def fan_out(
     jobs: Sequence[Job],
     workers: Workers | None,
     limits: ReplicateLimits = NO_LIMITS,
-    curves: Path | None = None,
 ) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes, or in this one; yield outcomes as they come.
 
@@ -29,10 +27,10 @@ def fan_out(
     """
     if workers is None:
         for job in jobs:
-            outcomes = run_jobs([job], limits, curves=curves)
+            outcomes = run_jobs([job], limits)
             yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
-    run = partial(run_jobs, limits=limits, in_worker=True, curves=curves)
+    run = partial(run_jobs, limits=limits, in_worker=True)
     replicates = Replicates(jobs, workers.number, limits)
     yield from workers.results(run, replicates.next_task, replicates.end_task)
 

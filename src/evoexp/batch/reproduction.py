@@ -23,7 +23,7 @@ from evoexp.registry import missing
 from evoexp.store.digests import array_bytes
 from evoexp.store.files import reason
 from evoexp.store.log import ARRAY
-from evoexp.store.log_reader import LogContents, decode_array, demand_place, read_log
+from evoexp.store.log_reader import LogContents, Place, decode_array, read_log
 from evoexp.store.manifest import differences
 
 TOLERANCE = 1e-9  # [-] by which numbers may differ: of their size, or absolutely if it is below 1
@@ -76,6 +76,7 @@ class Comparison(NamedTuple):
     fields: tuple[FieldDifference, ...] = ()
     inexact: str = ""  # why these are compared to `TOLERANCE`; empty: to the bit
     by_numbers: bool = False  # whether numbers are compared instead of chains
+    damage: str = ""  # what is wrong with the log, which nothing is compared with then
 
     @property
     def search_matches(self) -> bool:
@@ -98,6 +99,8 @@ class Comparison(NamedTuple):
     @property
     def verdict(self) -> str:
         """MATCH, or where it diverges."""
+        if self.damage:
+            return f"damaged: {self.damage}"
         if self.by_numbers:
             name, difference = farthest(self.fields)
             if self.matches:
@@ -119,31 +122,22 @@ class Comparison(NamedTuple):
         return f"MATCH in the search; DIVERGES in the rest: {shown}{more}{why}"
 
 
-class DamagedLog(NamedTuple):
-    """A log in the place of a replicate that cannot be compared."""
-
-    condition_id: str  # of the run, 64 hex digits
-    replicate: int  # the place
-    reason: str  # what is wrong with it, in one line
-
-
-def reproduce_stored(path: Path, condition_id: str, replicate: int) -> Comparison | DamagedLog:
+def reproduce_stored(path: Path, condition_id: str, replicate: int) -> Comparison:
     """Run a replicate of a stored run again, as `reproduce_log` does, if its log is whole."""
     try:
         return reproduce_log(path, (condition_id, replicate))
     except CorruptLog as error:
-        return DamagedLog(condition_id, replicate, reason(path, error))
+        damage = reason(path, error)
+        return Comparison(condition_id, replicate, None, False, 0, (), damage=damage)
 
 
-def reproduce_log(path: Path, place: tuple[str, int] | None = None) -> Comparison:
+def reproduce_log(path: Path, place: Place | None = None) -> Comparison:
     """Run a log's replicate again, from the configuration attached to the log alone.
 
     CorruptLog is raised where the log cannot be trusted, or is of another condition and replicate
     than its place; see `stored_condition`, too.
     """
-    stored = read_log(path)
-    if place is not None:
-        demand_place(str(path), (stored.condition_id, stored.replicate), place)
+    stored = read_log(path, place)
     condition = stored_condition(path, stored)
     refuse_large(condition, machine_memory())
     again = read_log(run_replicate(condition, stored.replicate).content)

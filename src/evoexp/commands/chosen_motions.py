@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.attachments import PREFIX, keep_all
-from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
+from evoexp.batch.reproduction import stored_condition
+from evoexp.commands.arguments import is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
 from evoexp.commands.stored_runs import finished_replicate, stored_run
 from evoexp.condition import Condition
@@ -22,7 +22,7 @@ from evoexp.playback.trajectory_files import JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
-from evoexp.store.log_reader import LogContents, read_log
+from evoexp.store.log_reader import read_log
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table
@@ -49,36 +49,6 @@ class FittingMotion(NamedTuple):
 
 
 # words of the command line
-
-
-def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
-    """Declare the arguments that choose motions, their speed, and the file to write."""
-    add_config_dir_argument(parser)
-    parser.add_argument(
-        "what",
-        nargs="+",
-        metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
-        help="any unique prefix of a run's hash, or a replicate's log; or a motion file, as for "
-        "evaluate, with an experiment",
-    )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
-    texts = ("of least cost (the default)", "of greatest cost", "first refuted one")
-    for name, text in zip(CHOICES, texts, strict=True):
-        settings: Any = {"dest": "choice", "action": "store_const", "const": name}
-        which.add_argument(f"--{name}", help=f"the replicate: {text}", **settings)
-    parser.add_argument(
-        "--only", default="", metavar="LABEL", help="of an experiment's conditions, this one"
-    )
-    parser.add_argument(
-        "--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn"
-    )
-    parser.add_argument(
-        "--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/"
-    )
 
 
 def named_log(word: str, choice: str | int | None) -> tuple[Path, RunDirectory | None]:
@@ -151,7 +121,7 @@ def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) 
         names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
         title = " · ".join(dict.fromkeys(names)) or run.hash12
     try:
-        condition = _condition_of(contents)
+        condition = stored_condition(log, contents)
     except RevisionMismatch as error:
         if run is None:
             raise
@@ -162,12 +132,6 @@ def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) 
     heading = Heading(title, contents.replicate, improvements)
     recording = record(condition, contents.solutions[-1].values, heading, limits)
     return recording._replace(condition_id=contents.condition_id, config_json=contents.config_json)
-
-
-def _condition_of(log: LogContents) -> Condition:
-    """Return the condition that is attached to a log, whose files are kept for it."""
-    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
-    return Condition.from_json(log.config_json)
 
 
 def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], ending: str) -> Path:
@@ -203,27 +167,14 @@ def fitting_motions(
         raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
     path = Path(files[0])
     values = read_motion(path)
-    is_trajectory = isinstance(values, JointTrajectory)
     fitting, misfits = [], dict[str, None]()
     for experiment in compose.expand(overrides, multirun=multirun, only=only):
         for label, condition in experiment.conditions:
-            planner, problem = condition.prepare()
-            if is_trajectory:
-                try:
-                    motion, remarks = _trajectory(label, condition, values)
-                except ValueError as error:
-                    misfits[str(error)] = None
-                else:
-                    own = FittingMotion(label, condition, np.empty(0), motion, remarks)
-                    fitting.append(own)
-                continue
-            shape = planner.shape(problem)
-            solution = flatten(values, shape)
-            if solution is None:
-                misfits[f"{label}: {shape_text(shape)}"] = None
-            else:
-                fitting.append(_solved(label, condition, solution))
-    if not fitting and is_trajectory:
+            try:
+                fitting.append(_fitting(label, condition, values))
+            except ValueError as misfit:
+                misfits[str(misfit)] = None
+    if not fitting and isinstance(values, JointTrajectory):
         raise MotionFileError(f"{path}: {'; '.join(misfits)}")
     if not fitting:
         plain = all("numbers" in text for text in misfits)
@@ -238,7 +189,7 @@ def stored_motion(log: Path) -> FittingMotion:
     """Return the best solution of a log, in the condition that is attached to it."""
     contents = read_log(log)
     label = f"{contents.condition_id[:12]} #{contents.replicate}"
-    return _solved(label, _condition_of(contents), contents.solutions[-1].values)
+    return _solved(label, stored_condition(log, contents), contents.solutions[-1].values)
 
 
 def initial_motion(
@@ -264,18 +215,21 @@ def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMo
     return FittingMotion(label, condition, solution, planner.motion(problem, solution))
 
 
-def _trajectory(
-    label: str, condition: Condition, given: JointTrajectory
-) -> tuple[Motion, tuple[str, ...]]:
-    """Return a trajectory as a motion of a condition's robot, and remarks."""
+def _fitting(label: str, condition: Condition, values: Any) -> FittingMotion:
+    """Return the content of a motion file in a condition; ValueError: it does not fit."""
     planner, problem = condition.prepare()
+    if not isinstance(values, JointTrajectory):
+        shape = planner.shape(problem)
+        if (solution := flatten(values, shape)) is None:
+            raise ValueError(f"{label}: {shape_text(shape)}")
+        return _solved(label, condition, solution)
     if not isinstance(condition.robot, Robot):
         raise ValueError(f"{label}: its robot has no joints for a trajectory")
     joints = joints_of(condition.robot.build())
-    motion, remarks = fitted(given, joints, condition.length_unit)
+    motion, remarks = fitted(values, joints, condition.length_unit)
     if len(planner.parts(problem, motion)) > 1:
         raise ValueError(
             f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
             "tell; give the solution (evaluate HASH --write FILE.json)"
         )
-    return motion, (JUDGED, *remarks)
+    return FittingMotion(label, condition, np.empty(0), motion, (JUDGED, *remarks))

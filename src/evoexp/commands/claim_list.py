@@ -6,7 +6,6 @@ from typing import Any
 
 from rich.table import Column
 
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.report_requests import request_of
 from evoexp.configuration import compose
@@ -19,18 +18,8 @@ from evoexp.store.run_directory import outputs_root
 
 _OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "size", "n", "verdict")
 OURS = "our question"  # the source of what no paper claims
+PAPERS = names(CLAIMS)
 KEYS = ("paper", *_OF_CLAIM, "experiment", "command")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument(
-        "papers",
-        metavar="PAPER",
-        nargs="*",
-        help=f"papers ({', '.join(names(CLAIMS))}); all of them if none is named",
-    )
-    add_json_argument(parser, f"a list of claims ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:

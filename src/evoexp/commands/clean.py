@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.condition import revisions
 from evoexp.errors import Busy, StoreError, UnknownOption
@@ -28,27 +27,8 @@ class Waste(NamedTuple):
 
 
 KEYS = Waste._fields
-KINDS = {
-    "temporary": "left by a process that was killed while it wrote",
-    "damaged": "set aside by run, which ran it again",
-    "failed": "reasons of failed replicates, which run tries again",
-    "old_revision": "whole runs by components of another revision, which this version cannot use",
-    "empty": "folders of runs without anything",
-}
+KINDS = ("temporary", "damaged", "failed", "old_revision", "empty")
 USUAL = ("temporary", "damaged", "empty")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    told = "; ".join(f"{kind}: {why}" for kind, why in KINDS.items())
-    parser.add_argument(
-        "kinds",
-        nargs="*",
-        metavar="KIND",
-        help=f"{told} (by default {', '.join(USUAL)}; all: every kind)",
-    )
-    parser.add_argument("--yes", action="store_true", help="delete; without it nothing is changed")
-    add_json_argument(parser, f"a list of files ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -3,67 +3,27 @@
 import argparse
 import importlib
 import re
+from importlib import resources
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
 
+import yaml
+
+from evoexp.commands.arguments import labels
 from evoexp.errors import nearest
 from evoexp.version import __version__
 
-COMMANDS = {
-    "run": "run an experiment: its missing replicates, then its report",
-    "plan": "list what a run would start: there, missing, failed, damaged; time and memory",
-    "report": "draw an experiment's figures and tables again, from outputs alone",
-    "site": "write the home page of all reports: papers, claims, runs, a search",
-    "compare": "compare planners by their proven answers, over collision queries",
-    "claims": "list the papers' claims: rule, numbers, verdict",
-    "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
-    "verify": "check stored runs: every log whole and in its place, and the files beside",
-    "diff": "compare two runs: settings, environment, results",
-    "clean": "list files that no command needs, and delete them if told so",
-    "pack": "write stored runs as one file, for another machine",
-    "evaluate": "judge a given motion by an experiment's criteria",
-    "view": "write a motion as an offline page that plays it",
-    "play": "write a motion as a log that plays in Foxglove",
-    "export": "write a motion as a joint trajectory for a robot or MoveIt",
-    "list": "list experiments and stored runs",
-    "show": "show a condition, before or after it is run: identity, origin, result, verdict",
-    "new": "write a package with a planner of your own, to begin with",
-    "completion": "print a script with which the shell completes commands",
-}
+_TYPES: dict[str, Any] = {"int": int, "float": float, "path": Path, "labels": labels}
+_DECLARED: dict[str, Any] = yaml.load(
+    resources.files("evoexp").joinpath("assets/commands.yaml").read_bytes(), yaml.CSafeLoader
+)
+COMMANDS: dict[str, str] = {name: command["summary"] for name, command in _DECLARED.items()}
 MODULES = {"list": "list_", "claims": "claim_list"}  # where a module has another name
 
 
-HYDRAS_OPTIONS = {
-    "--cfg": "evoexp show experiment=NAME; with --all every setting",
-    "--info": "evoexp show experiment=NAME; evoexp list",
-    "--resolve": "evoexp show --all experiment=NAME",
-    "--package": "evoexp show --all experiment=NAME",
-    "--run": "evoexp run experiment=NAME",
-    "--config-name": "evoexp run experiment=NAME",
-    "--config-path": "--config-dir DIR",
-    "--experimental-rerun": "evoexp reproduce HASH",
-    "--shell-completion": "evoexp completion bash",
-    "--hydra-help": "evoexp run --help",
-}
-"""Option of a Hydra application → evoexp's own way."""
-
-
 class CommandParser(argparse.ArgumentParser):
-    """Parser that names the wrong word in one line.
-
-    Takes no abbreviated options, whose meaning changes when options are added.
-    """
-
-    def __init__(self, **settings: Any) -> None:
-        """Declare nothing but `--help` yet."""
-        self.declared: list[argparse.Action] = []
-        super().__init__(allow_abbrev=False, **settings)
-
-    def add_argument(self, *names: Any, **settings: Any) -> argparse.Action:
-        """Declare an argument, and remember it."""
-        argument = super().add_argument(*names, **settings)
-        self.declared.append(argument)
-        return argument
+    """Parser that names the wrong word in one line."""
 
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one line that names the choices."""
@@ -83,9 +43,7 @@ class CommandParser(argparse.ArgumentParser):
             word = next((word for word in words if word.startswith("-")), words[0])
             lines = re.findall(r"^  (-.+?)(?:  |$)", self.format_help(), re.MULTILINE)
             known = re.findall(r"(?<![\w-])--?[a-z][\w-]*", "\n".join(lines))
-            instead = HYDRAS_OPTIONS.get(word.partition("=")[0])
             message = f"no option '{word}'{nearest(word, known)} (options: {', '.join(known)})"
-            message = f"no option '{word}': {instead}" if instead else message
         self.exit(2, f"evoexp: {message}\n")
 
 
@@ -97,8 +55,13 @@ def command_module(name: str) -> ModuleType:
 def command_parser(name: str) -> CommandParser:
     """Return the parser of one command; its module is imported."""
     summary = COMMANDS[name]
-    parser = CommandParser(prog=f"evoexp {name}", description=f"{summary[0].upper()}{summary[1:]}.")
-    command_module(name).add_arguments(parser)
+    parser = CommandParser(
+        prog=f"evoexp {name}",
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=_DECLARED[name].get("epilog"),
+        allow_abbrev=False,  # what they mean changes when options are added
+    )
+    _declare(parser, name)
     return parser
 
 
@@ -106,15 +69,32 @@ def whole_parser(
     *, with_arguments: bool = False
 ) -> tuple[argparse.ArgumentParser, list[argparse.Action]]:
     """Return the parser of all commands, if asked for with the arguments of all, and these."""
-    parser = CommandParser(
-        prog="evoexp", description="A laboratory for evolutionary robot motion planning."
-    )
+    about = "A laboratory for evolutionary robot motion planning."
+    parser = CommandParser(prog="evoexp", description=about, allow_abbrev=False)
     parser.add_argument("--version", action="version", version=f"evoexp {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=CommandParser)
     declared: list[argparse.Action] = []
     for name, summary in COMMANDS.items():
         command = commands.add_parser(name, help=summary, add_help=with_arguments)
         if with_arguments:
-            command_module(name).add_arguments(command)
-            declared += command.declared
+            declared += _declare(command, name)
     return parser, declared
+
+
+def _declare(parser: CommandParser, name: str) -> list[argparse.Action]:
+    """Declare the arguments of a command; return them."""
+    module, choice, declared = command_module(name), None, []
+
+    def constant(match: re.Match[str]) -> str:
+        return ", ".join(getattr(module, match[1]))
+
+    for *names, given in _DECLARED[name]["arguments"]:
+        settings = given | {"help": re.sub(r"{(\w+)}", constant, given["help"])}
+        if "type" in settings:
+            settings["type"] = _TYPES[settings["type"]]
+        if settings.pop("is_choice", False):  # one of them at most
+            choice = choice or parser.add_mutually_exclusive_group()
+            declared.append(choice.add_argument(*names, **settings))
+        else:
+            declared.append(parser.add_argument(*names, **settings))
+    return declared

@@ -5,7 +5,7 @@ import hashlib
 import shlex
 from pathlib import Path
 
-from evoexp.commands.arguments import add_experiment_arguments, add_json_argument, folder_words
+from evoexp.commands.arguments import folder_words
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.commands.pack import unpacked
 from evoexp.commands.report_requests import MAX_NAMED, ReportRequest, chosen
@@ -20,31 +20,6 @@ from evoexp.report.results.ioh_format import ioh_files
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
 from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "+"
-    words.help = "experiments and overrides as for run, or prefixes of the hashes of stored runs"
-    parser.add_argument(
-        "--data",
-        metavar="FILE.csv",
-        help="runs of other planners: columns planner, problem, seed, queries, cost; a row per "
-        "improvement, cost: the path's length, empty: the run has no answer",
-    )
-    parser.add_argument(
-        "--best-known",
-        metavar="FILE.yaml",
-        help="best known lengths of problems, besides those that come with evoexp: targets are "
-        "multiples of them",
-    )
-    parser.add_argument("--csv", metavar="FILE", help="write the table as CSV, with all digits")
-    parser.add_argument("--latex", metavar="FILE", help="write the answers as LaTeX (booktabs)")
-    parser.add_argument(
-        "--ioh", metavar="FOLDER", help="write the runs for IOHanalyzer and iohinspector"
-    )
-    add_json_argument(parser, "an object per condition")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -7,31 +7,12 @@ from typing import Any
 
 import shtab
 
-from evoexp.commands.arguments import add_config_dir_argument
 from evoexp.commands.command_parser import whole_parser
 from evoexp.configuration.search_path import groups, options
 from evoexp.errors import SettingError
 
 SHELLS = ("bash", "zsh")
-LINES = {
-    "bash": "evoexp completion bash > ~/.local/share/bash-completion/completions/evoexp",
-    "zsh": "evoexp completion zsh > ~/.zfunc/_evoexp, with fpath+=~/.zfunc in ~/.zshrc",
-}
-"""The line to type once, per shell."""
 SINGLE = ("num_replicates", "seed")  # settings of no group
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    lines = "; ".join(f"{shell}: {line}" for shell, line in LINES.items())
-    parser.add_argument(
-        "shell",
-        choices=(*SHELLS, "options"),
-        help=f"to be typed once, for {lines}. `options GROUP` prints the names that the scripts "
-        "offer behind GROUP=",
-    )
-    parser.add_argument("group", nargs="?", metavar="GROUP", help="experiment, robot, …")
-    add_config_dir_argument(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:

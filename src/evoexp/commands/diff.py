@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
 from evoexp.errors import UnknownHash
 from evoexp.records import TIMES
 from evoexp.store.identity import TAKEN
-from evoexp.store.manifest import differences
+from evoexp.store.manifest import differences, leaves
+from evoexp.store.run_context import typed_parts
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 
@@ -33,25 +33,13 @@ class Side(NamedTuple):
     rows: dict[int, dict[str, Any]]  # its replicates, done ones only
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    for name in ("a", "b"):
-        parser.add_argument(
-            name,
-            metavar=name.upper(),
-            help="any unique prefix of a run's hash, or of a shipped condition's; or an archive of "
-            "runs, RUNS.tar[:HASH]",
-        )
-    add_json_argument(parser, f"one mapping ({', '.join(KEYS)})")
-
-
 def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code as that of `diff`: 0 nothing differs, 1 something, 2 cannot be compared.
 
     Times differ always and do not count.
     """
     one, two = _side(arguments.a), _side(arguments.b)
-    settings = list(changed(one.settings, two.settings))
+    settings = list(changed(typed_parts(one.settings), typed_parts(two.settings)))
     environment = _environment(one, two)
     names = dict.fromkeys(k for side in (one, two) for row in side.rows.values() for k in row)
     terms = [name for name in names if name.startswith("term_")]
@@ -74,28 +62,12 @@ def main(arguments: argparse.Namespace) -> int:
     return 1 if settings or environment or other else 0
 
 
-def changed(one: Any, two: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield (dotted name, value, other value) where plain data differ; None: not there.
-
-    A component and one around it differ by their types alone: a planner, and its control.
-    """
-    if _is_around(one, two):
-        yield name, f"{one['_target_']} around it", two["_target_"]
-    elif _is_around(two, one):
-        yield name, one["_target_"], f"{two['_target_']} around it"
-    elif isinstance(one, Mapping) and isinstance(two, Mapping):
-        for key in [*one, *(key for key in two if key not in one)]:
-            yield from changed(one.get(key), two.get(key), f"{name}.{key}" if name else str(key))
-    elif isinstance(one, list) and isinstance(two, list) and len(one) == len(two):
-        for k, (a, b) in enumerate(zip(one, two, strict=True)):
-            yield from changed(a, b, f"{name}[{k}]")
-    elif one != two:
-        yield name, one, two
-
-
-def _is_around(outer: Any, inner: Any) -> bool:
-    components = [isinstance(each, Mapping) and "_target_" in each for each in (outer, inner)]
-    return all(components) and inner in outer.values()
+def changed(one: Any, two: Any) -> Iterator[tuple[str, Any, Any]]:
+    """Yield (dotted name, value, other value) where plain data differ; None: not there."""
+    before, after = dict(leaves(one)), dict(leaves(two))
+    for name in dict.fromkeys([*before, *after]):
+        if before.get(name) != after.get(name):
+            yield name, before.get(name), after.get(name)
 
 
 def _side(prefix: str) -> Side:
@@ -133,8 +105,8 @@ def _environment(one: Side, two: Side) -> list[tuple[str, Any, Any]]:
         for each in differences(one.manifest, two.manifest)
         if each.name.split(".")[0] not in ORIGIN
     ]
-    code = one.manifest.get("git"), two.manifest.get("git")
-    return [*found, *(changed(*code, "git"))]
+    code = [{"git": manifest.get("git")} for manifest in (one.manifest, two.manifest)]
+    return [*found, *changed(*code)]
 
 
 def _results(rows: Collection[Mapping[str, Any]], terms: Sequence[str]) -> dict[str, Any]:

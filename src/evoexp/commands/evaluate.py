@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Column, Table
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.commands.arguments import add_experiment_arguments, is_motion
+from evoexp.commands.arguments import is_motion
 from evoexp.commands.chosen_motions import (
     FittingMotion,
     fitting_motions,
@@ -30,31 +30,6 @@ REMARKS = "remarks"  # of a row: how a trajectory was read
 HEX = re.compile("[0-9a-fA-F]{1,64}")  # a prefix of a hash
 _Judged = tuple[dict[str, Any], Listing | None]  # a row, and its table of configurations
 HEAD = ("label", "condition", "length_unit")  # of a row; its other entries are terms and verdict
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "HASH | LOG.mcap | MOTION KEY=VALUE", "+"
-    words.help = (
-        "any unique prefix of a run's hash, or a replicate's log; or a motion file, and an "
-        "experiment with overrides as for run. A motion file is a solution in the planner's "
-        "documented shape, start and goal included (.json: nested lists, .npy: an array), or a "
-        "joint trajectory as export writes it (.csv, .json, .yaml), judged by its bodies alone"
-    )
-    parser.add_argument(
-        "--replicate", type=int, metavar="K", help="of a hash: this one, not that of least cost"
-    )
-    parser.add_argument(
-        "--write",
-        type=Path,
-        metavar="FILE.json",
-        help="write the motion, too; without a motion file, as a template for your own: the best "
-        "of an initial population",
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print flat JSON: one object, or a list of them"
-    )
 
 
 def main(arguments: argparse.Namespace) -> int:

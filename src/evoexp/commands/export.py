@@ -2,12 +2,10 @@
 
 import argparse
 import math
-from pathlib import Path
 
 import numpy as np
 
 from evoexp.commands.chosen_motions import (
-    add_motion_arguments,
     output_path,
     single,
     speed_limits,
@@ -19,40 +17,6 @@ from evoexp.playback.joint_limits import joint_limits
 from evoexp.playback.trajectory import as_csv, as_json, as_ros, trajectory
 
 ANSWERS = {True: "yes", False: "no", None: "undecided"}
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_motion_arguments(parser, ".json")
-    parser.add_argument(
-        "--format",
-        choices=("csv", "json", "ros"),
-        default="json",
-        help="ros: a trajectory_msgs/msg/JointTrajectory in JSON, which is YAML, too; json: with "
-        "origin, units and verdict",
-    )
-    parser.add_argument(
-        "--timing",
-        choices=("optimal", "uniform"),
-        default="optimal",
-        help="optimal: as fast as speeds and accelerations permit, from rest to rest, also where "
-        "two straight lines meet (needs toppra: evoexp[timing]); uniform: equal times from instant "
-        "to instant, whose speed jumps",
-    )
-    parser.add_argument(
-        "--limits",
-        type=Path,
-        metavar="joint_limits.yaml",
-        help="limits of speed and acceleration by joint, as MoveIt's file; where it has "
-        "none, the robot's own speeds, then --turn-speed, --slide-speed",
-    )
-    parser.add_argument(
-        "--ramp",
-        type=float,
-        default=0.5,
-        metavar="S",
-        help="time from rest to full speed, where --limits sets no acceleration",
-    )
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -1,12 +1,12 @@
 """`evoexp list`: the experiments that can be run, and the runs that are stored."""
 
 import argparse
+import math
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from evoexp.commands.arguments import add_config_dir_argument, add_json_argument
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
 from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
@@ -14,110 +14,95 @@ from evoexp.errors import EvoexpError, printable
 from evoexp.store.files import listed
 from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import summary_rows
+from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
-FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
-COUNT_KEYS = ("done", "failed", "solved")
-RUN_KEYS = ("hash", *ORIGIN, "changed", *COUNT_KEYS, "median_best_cost", "damage")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_config_dir_argument(parser)
-    parser.add_argument(
-        "--failed", action="store_true", help="list the failed replicates of stored runs instead"
-    )
-    keys = [", ".join(names) for names in (EXPERIMENT_KEYS, RUN_KEYS, FAILED_KEYS)]
-    content = f"experiments ({keys[0]}) and runs ({keys[1]}); with --failed, failures ({keys[2]})"
-    add_json_argument(parser, content)
+RUN_KEYS = (
+    *("hash", *ORIGIN, "changed", "planned", "done", "failed", "solved", "certified"),
+    *("median_best_cost", "median_cpu_s", "damage"),
+)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Print both lists, or that of failures."""
     if arguments.failed:
-        failures = _failures()
-        if arguments.json:
-            print_json(failures)
-        elif failures:
-            table = new_table("", hash_column(), "condition", *right("#"), "reason")
-            for each in failures:
-                label, reason = coloured(each["label"]), coloured(each["reason"])
-                table.add_row(each["hash"], label, str(each["replicate"]), reason)
-            say(table)
-        else:
-            say(f"no failed replicates in {outputs_root()}")
+        count = 0
+        runs = [run for _, run in stored_runs(outputs_root()) if isinstance(run, RunDirectory)]
+        for run in runs:
+            for replicate in sorted(run.failed()):
+                count += 1
+                try:
+                    reason = str(run.failure(replicate)["reason"])
+                except EvoexpError as error:
+                    reason = str(error)
+                path = run.failure_path(replicate)
+                say(f"{run.hash12} #{replicate}: {printable(reason)} ({path})")
+        say(f"{count or 'no'} failed replicates in {outputs_root()}")
         return 0
     files = [find("experiment", name) for name in options("experiment")]
     rows = ((each.name, description(each.name), each.origin, each.path) for each in files)
     experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in rows]
-    runs = [_run(name, run) for name, run in stored_runs(outputs_root())]
+    entries = [run_row(name, run) for name, run in stored_runs(outputs_root())]
     if arguments.json:
-        print_json({"experiments": experiments, "runs": runs})
+        print_json({"experiments": experiments, "runs": entries})
         return 0
     table = new_table("experiments", "run experiment=", "description", "from")
     for each in experiments:
         table.add_row(each["name"], each["description"], each["origin"])
     say(table)
-    say(_run_table(runs) if runs else f"no runs stored in {outputs_root()}")
+    title = f"runs stored in {outputs_root()}"
+    say(run_table(title, entries) if entries else f"no runs stored in {outputs_root()}")
     return 0
 
 
-def _failures() -> list[dict[str, Any]]:
-    """Return the failed replicates, run by run."""
-    rows = []
-    for name, run in stored_runs(outputs_root()):
-        if isinstance(run, EvoexpError) or not run.failed():
-            continue
-        label = origin_of(run)["label"] or ""
-        for replicate in sorted(run.failed()):
-            try:
-                reason = str(run.failure(replicate)["reason"])
-            except EvoexpError as error:
-                reason = str(error)
-            row = (name, label, replicate, reason, str(run.failure_path(replicate)))
-            rows.append(dict(zip(FAILED_KEYS, row, strict=True)))
-    return rows
-
-
-def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
+def run_row(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     """Return the entry of a stored run; of a damaged run little but the damage."""
     row: dict[str, Any] = dict.fromkeys(RUN_KEYS) | {"hash": name, "changed": False}
     try:
         if isinstance(run, EvoexpError):
             raise run
-        rows, damaged = summary_rows(run, ["status", "solved", "best_cost"])
+        names = ["status", "solved", "certified", "clearance", "best_cost", "cpu_s"]
+        rows, damaged = summary_table(run).select(names).to_pylist(), damaged_logs(run)
     except EvoexpError as error:
         return row | {"damage": str(error)}
     except OSError as error:
         return row | {"damage": f"{error.filename}: {error.strerror}"}
     done = [each for each in rows if each["status"] == "done"]
+    moved = any(not math.isnan(each["clearance"]) for each in done)
     damaged = run.damaged_files() | damaged
     return row | {
         "hash": run.condition_id,
+        "planned": run.num_planned(),
         "done": len(done),
         "failed": len(rows) - len(done),
         "solved": sum(bool(each["solved"]) for each in done),
+        "certified": sum(each["certified"] is True for each in done) if moved else None,
         "median_best_cost": np.median([each["best_cost"] for each in done]) if done else None,
+        "median_cpu_s": np.median([each["cpu_s"] for each in done]) if done else None,
         **origin_of(run),
         "damage": f"damaged: {listed(damaged)}" if damaged else None,
     }
 
 
-def _run_table(runs: list[dict[str, Any]]) -> Table:
-    numbers = right(*COUNT_KEYS, "median\nbest cost")
-    table = new_table(f"runs stored in {outputs_root()}", hash_column(), "condition", *numbers)
+def run_table(title: str, runs: list[dict[str, Any]]) -> Table:
+    """Return a table of the entries of stored runs."""
+    numbers = right("done", "failed", "solved /\ncertified", "median\ncost", "CPU s\neach")
+    table = new_table(title, hash_column(), "condition", *numbers)
     for run in runs:
         if run["done"] is None:
-            table.add_row(run["hash"][:12], coloured(run["damage"], "red"), "–", "–", "–", "–")
+            table.add_row(run["hash"][:12], coloured(run["damage"], "red"), *5 * ["–"])
             continue
-        names = [run[name] or "?" for name in ORIGIN]
-        known = any(run[name] for name in ORIGIN)
-        text = ", ".join(names) + (" (changed)" if run["changed"] else "")
-        condition = coloured(text if known else "(no manifest)")
+        named = ", ".join(filter(None, (run[name] for name in ORIGIN))) or "(no manifest)"
+        condition = coloured(named + " (changed)" * run["changed"])
         if run["damage"]:
             condition.append(printable(f" · {run['damage']}"), "red")
-        cost = run["median_best_cost"]
-        shown = "–" if cost is None else f"{cost:.4g}"
-        table.add_row(run["hash"][:12], condition, *(str(run[k]) for k in COUNT_KEYS), shown)
+        table.add_row(
+            run["hash"][:12],
+            condition,
+            f"{run['done']} of {run['planned']}",
+            str(run["failed"]),
+            f"{run['solved']} / {'–' if run['certified'] is None else run['certified']}",
+            f"{run['median_best_cost']:.4g}" if run["done"] else "–",
+            f"{run['median_cpu_s']:.3f}" if run["done"] else "–",
+        )
     return table

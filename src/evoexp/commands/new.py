@@ -26,15 +26,6 @@ class PackageExists(EvoexpError):
     """A directory or an installed module that has the name of the new package."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument("kind", choices=tuple(COMMANDS), help="of the component")
-    told = "of the package: lower-case letters, digits and _"
-    parser.add_argument("name", metavar="NAME", help=told)
-    told = "where to write the folder NAME; by default here"
-    parser.add_argument("--directory", type=Path, default=Path(), metavar="DIR", help=told)
-
-
 def main(arguments: argparse.Namespace) -> int:
     """Write the package and print the commands to type next."""
     name = arguments.name

@@ -20,15 +20,6 @@ ENDING = ".tar"
 NAMED = 3  # runs whose hashes the name of an archive spells out
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument(
-        "hashes", nargs="+", metavar="HASH", help="any unique prefixes of runs' hashes"
-    )
-    told = "by default named by the hashes, in the current directory"
-    parser.add_argument("-o", "--output", type=Path, metavar=f"FILE{ENDING}", help=told)
-
-
 def main(arguments: argparse.Namespace) -> int:
     """Write the archive."""
     runs = {run.condition_id: run for run in map(stored_run, arguments.hashes)}

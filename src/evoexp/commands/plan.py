@@ -6,6 +6,7 @@ Nothing is run or written.
 import argparse
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -15,12 +16,12 @@ import numpy as np
 
 from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
 from evoexp.batch.workers import num_cores
-from evoexp.commands.arguments import add_experiment_arguments, add_json_argument
 from evoexp.commands.console import hash_column, new_table, print_json, right, say
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import StoreError
 from evoexp.store.identity import CONFIG, read
+from evoexp.store.manifest import leaves
 from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
 from evoexp.store.summaries import damaged_logs, summary_table
 from evoexp.validation import TARGET
@@ -29,7 +30,6 @@ START_S = 5.0  # [s] assumed: at most, to start workers and compile nothing
 CONDITION_S = 0.05  # [s] assumed: at most, to prepare a condition and write its files
 FEW = 3  # replicates, below which their spread is not known
 OTHER_SETTINGS = 1.5  # an evaluation with other settings takes so many times as long, or as short
-ALL_GENERATIONS = "generations"  # reason to stop of a replicate that had all of them
 
 
 class PlannedCondition(NamedTuple):
@@ -51,23 +51,10 @@ class PlannedCondition(NamedTuple):
     memory_gb_each: float  # of a replicate [GB]
 
 
-class Times(NamedTuple):
-    """Times of a run's finished replicates."""
-
-    cpu_s: list[float]  # of each replicate [s]
-    evaluations: list[int]  # of each replicate
-    stopped_early: bool  # whether one did not have all generations
-
-
+Times = list[tuple[float, int]]  # CPU time [s] and evaluations of a run's finished replicates
 # mean, least and most CPU time of a replicate that was not run yet [s], None: unknown; its origin
 Estimate = tuple[float | None, float | None, float | None, str]
 KEYS = PlannedCondition._fields
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_experiment_arguments(parser)
-    add_json_argument(parser, f"a list of conditions ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -86,7 +73,7 @@ def main(arguments: argparse.Namespace) -> int:
             asked = set(range(count))
             damaged = {int(Path(name).stem) for name in damaged_logs(run)} if done else set()
             cached, failed = (done - damaged) & asked, run.failed() & asked
-            same_settings = stored.named.get(_key(_without_revisions(settings)), ())
+            same_settings = stored.named.get(_without_revisions(settings), ())
             rows[condition.id] = PlannedCondition(
                 experiment.name,
                 label,
@@ -161,7 +148,7 @@ class StoredTimes:
         """Read the configurations of all runs; those that cannot be read are left out."""
         self.named: dict[str, list[str]] = {}  # settings without revisions → ids of runs
         self._alike: dict[str, list[RunDirectory]] = {}  # planner and scene → runs
-        self._known: dict[str, list[Times]] = {}
+        self._times: dict[str, Times] = {}  # of a run
         for name in run_names(outputs):
             try:
                 content = read(outputs / "runs" / name / CONFIG)
@@ -170,76 +157,52 @@ class StoredTimes:
                 continue
             condition_id = hashlib.sha256(content).hexdigest()
             if condition_id.startswith(name) and isinstance(settings, dict):
-                self.named.setdefault(_key(_without_revisions(settings)), []).append(condition_id)
+                self.named.setdefault(_without_revisions(settings), []).append(condition_id)
                 run = RunDirectory(outputs, condition_id)
                 self._alike.setdefault(_scene(settings), []).append(run)
 
     def estimate(self, condition: Condition, run: RunDirectory, settings: Any) -> Estimate:
         """Estimate the CPU time of a replicate: from its own ones, else from runs like it."""
-        if (own := _times(run)).cpu_s:
-            widening = 1.0 if len(own.cpu_s) >= FEW else 2.0
-            least, most = min(own.cpu_s) / widening, max(own.cpu_s) * widening
-            mean = float(np.mean(own.cpu_s))
-            return mean, least, most, f"{len(own.cpu_s)} of its own"
-        scene = _scene(settings)
-        if scene not in self._known:
-            runs = map(_times, self._alike.get(scene, ()))
-            self._known[scene] = [times for times in runs if any(times.evaluations)]
-        if not (alike := self._known[scene]):
+        if own := [seconds for seconds, _ in self._times_of(run)]:
+            widening = 1.0 if len(own) >= FEW else 2.0
+            least, most = min(own) / widening, max(own) * widening
+            return float(np.mean(own)), least, most, f"{len(own)} of its own"
+        alike = list(filter(None, map(self._times_of, self._alike.get(_scene(settings), ()))))
+        if not alike:
             return None, None, None, "nothing stored like it"
         generations = range(min(condition.planner.num_generations, 10_000) + 1)
         least, most = bounds(alike, sum(map(condition.planner.num_evaluations, generations)))
         source = f"{len(alike)} other runs of the scene"
-        return float(np.sqrt(least * most)), least, most, source
+        return math.sqrt(least * most), least, most, source
+
+    def _times_of(self, run: RunDirectory) -> Times:
+        if run.hash12 not in self._times:
+            rows = summary_table(run).to_pylist() if run.completed() else []
+            done = [row for row in rows if row["status"] == "done" and row["cpu_s"]]
+            self._times[run.hash12] = [(row["cpu_s"], row["evaluations"]) for row in done]
+        return self._times[run.hash12]
 
 
 def bounds(alike: Sequence[Times], evaluations: int) -> tuple[float, float]:
     """Return the least and the most that a replicate of so many evaluations may take [s].
 
     More evaluations take more time, but no more than in proportion: a part of the time is the same
-    for any number. Runs of about as many evaluations, or the nearest number, tell the most.
+    for any number. The run of the nearest number of evaluations tells it.
     """
-    ratios = np.array(
-        [evaluations / max(1.0, float(np.mean(times.evaluations))) for times in alike]
-    )
-    spent = np.array([np.mean(times.cpu_s) for times in alike])  # [s]
-    distance = np.abs(np.log(np.maximum(ratios, 1e-9)))
-    near = distance <= distance.min() + 0.1
-    least, most = (spent * np.minimum(ratios, 1.0))[near], (spent * np.maximum(ratios, 1.0))[near]
-    low, high = float(np.quantile(least, 0.1)), float(np.quantile(most, 0.9))
-    if any(times.stopped_early for times in alike):  # as the next one may
-        low = min(low, *(min(times.cpu_s) for times in alike))
-    return low / OTHER_SETTINGS, high * OTHER_SETTINGS
+    ratios = [max(1, evaluations) / np.mean([max(1, count) for _, count in run]) for run in alike]
+    nearest = min(range(len(alike)), key=lambda k: abs(math.log(ratios[k])))
+    spent, ratio = [seconds for seconds, _ in alike[nearest]], float(ratios[nearest])
+    least, most = min(spent) * min(ratio, 1.0), max(spent) * max(ratio, 1.0)
+    return least / OTHER_SETTINGS, most * OTHER_SETTINGS
 
 
-def _times(run: RunDirectory) -> Times:
-    if not run.completed():
-        return Times([], [], False)
-    columns = ["status", "cpu_s", "evaluations", "stop_reason"]
-    rows = [row for row in summary_table(run).select(columns).to_pylist() if row["cpu_s"]]
-    done = [row for row in rows if row["status"] == "done"]
-    return Times(
-        [float(row["cpu_s"]) for row in done],
-        [int(row["evaluations"] or 0) for row in done],
-        any(row["stop_reason"] != ALL_GENERATIONS for row in done),
-    )
-
-
-def _without_revisions(config: Any) -> Any:
-    """Return plain data of a condition without the revisions of its components."""
-    if isinstance(config, Mapping):
-        return {key: _without_revisions(v) for key, v in config.items() if key != "revision"}
-    if isinstance(config, list):
-        return [_without_revisions(value) for value in config]
-    return config
+def _without_revisions(config: Any) -> str:
+    """Return a key of a condition's settings, the same for all revisions of its components."""
+    return json.dumps([each for each in leaves(config) if not each[0].endswith("revision")])
 
 
 def _scene(settings: Mapping[str, Any]) -> str:
     """Return a key of the planner's component and the scene, shared by runs of other settings."""
     planner = settings.get("planner")
     name = planner.get(TARGET) if isinstance(planner, Mapping) else None
-    return _key([name, settings.get("robot"), settings.get("scenario")])
-
-
-def _key(value: Any) -> str:
-    return json.dumps(value, sort_keys=True)
+    return json.dumps([name, settings.get("robot"), settings.get("scenario")], sort_keys=True)

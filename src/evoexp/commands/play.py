@@ -2,13 +2,8 @@
 
 import argparse
 
-from evoexp.commands.chosen_motions import add_motion_arguments, output_path, single, write
+from evoexp.commands.chosen_motions import output_path, single, write
 from evoexp.playback.playable_log import LAYOUT, layout, playable_log
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_motion_arguments(parser, ".mcap")
 
 
 def main(arguments: argparse.Namespace) -> int:

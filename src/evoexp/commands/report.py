@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from evoexp.commands import compare
-from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.command_parser import command_parser
 from evoexp.commands.console import say, say_each
 from evoexp.commands.pack import unpacked
@@ -27,28 +26,6 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 
 PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
 CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "*"
-    words.help = (
-        "an experiment and overrides as for run, or prefixes of the hashes of stored runs; "
-        f"`{CLAIMS}`: every paper's page of claims under every reading"
-    )
-    parser.add_argument(
-        "--all",
-        action="store_true",
-        help="every experiment of which something is stored, every report that is there, and the "
-        "home page (evoexp site)",
-    )
-    parser.add_argument(
-        "--check",
-        action="store_true",
-        help="write nothing: derive every file again, name those that differ, are missing or left "
-        "over; exit code 1 if there are any",
-    )
 
 
 def main(arguments: argparse.Namespace) -> int:

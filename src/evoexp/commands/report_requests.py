@@ -50,14 +50,6 @@ def chosen(
     multirun, only, known = arguments.multirun, arguments.only, options("experiment")
     overrides = [word for word in arguments.overrides if is_override(word)]
     names = [word for word in arguments.overrides if word not in overrides]
-    # `rana_planar@smoke`, as the folder of a report is named
-    parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
-    if budgets := {f"budget={budget}" for _, at, budget in parted if at}:
-        budgets |= {word for word in overrides if word.startswith("budget=")}
-        if len(budgets) > 1 or not all(at for _, at, _ in parted):
-            raise SettingError("budget", "one for all experiments", " ".join(names))
-        names = [name for name, _, _ in parted]
-        overrides += budgets - set(overrides)
     unknown = [name for name in names if name not in known and not is_file(name)]
     if names and len(unknown) == len(names) and all(map(_HASH.fullmatch, names)):
         if overrides or multirun or only:

@@ -9,7 +9,6 @@ from pathlib import Path
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import (
     Comparison,
-    DamagedLog,
     fingerprint,
     reproduce_log,
     reproduce_stored,
@@ -24,17 +23,6 @@ from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 FEW = 8  # replicates below this are run here, without worker processes
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument(
-        "what",
-        metavar="HASH|LOG.mcap|RUNS.tar[:HASH]",
-        help="any unique prefix of a run's hash, a replicate's log, or an archive of runs, which "
-        "is looked into and not taken into the store",
-    )
-    parser.add_argument("--replicate", type=int, metavar="K", help="only this replicate of the run")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -58,7 +46,7 @@ def main(arguments: argparse.Namespace) -> int:
     return _report(_of_run(run, arguments.replicate))
 
 
-def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison | DamagedLog]:
+def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison]:
     """Run the finished replicates of a run again, or one of them."""
     try:
         if replicate is not None:
@@ -72,31 +60,28 @@ def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison | Damag
         raise RevisionMismatch(f"{text} {remedy}") from None
 
 
-def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison | DamagedLog]:
+def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison]:
     waiting = deque((run.log_path(k), run.condition_id, k) for k in replicates)
-    compared: list[Comparison | DamagedLog] = []
+    compared: list[Comparison] = []
     with contextlib.ExitStack() as stack:
         workers = stack.enter_context(Workers(num_cores())) if len(waiting) > FEW else None
         # the first one compiles, before any worker does
-        while waiting and not any(isinstance(each, Comparison) for each in compared):
+        while waiting and not any(not each.damage for each in compared):
             compared.append(reproduce_stored(*waiting.popleft()))
         if workers is None:
             return compared + [reproduce_stored(*each) for each in waiting]
         return [*compared, *in_order(workers, reproduce_stored, waiting)]
 
 
-def _report(rows: Sequence[Comparison | DamagedLog]) -> int:
+def _report(rows: Sequence[Comparison]) -> int:
     numbers = right("replicate", "generations")
     table = new_table("", hash_column("run"), *numbers, "verdict")
     for row in rows:
-        if isinstance(row, DamagedLog):
-            verdict, generations = coloured(f"damaged: {row.reason}", "red"), "–"
-        else:
-            verdict = coloured(row.verdict, "green" if row.matches else "red")
-            generations = str(row.num_generations)
+        verdict = coloured(row.verdict, "green" if row.matches else "red")
+        generations = str(row.num_generations or "–")
         table.add_row(row.condition_id[:12], str(row.replicate), generations, verdict)
     say(table)
-    compared = [row for row in rows if isinstance(row, Comparison)]
+    compared = [row for row in rows if not row.damage]
     diverging = [row for row in compared if not row.matches]
     if diverging:
         lines = diverging[0].environment or ("none: the environment is the same",)

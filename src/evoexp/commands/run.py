@@ -5,22 +5,20 @@ import contextlib
 import functools
 import hashlib
 import importlib.util
-import math
 import shlex
 import sys
-import tempfile
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import add_experiment_arguments, folder_words
+from evoexp.commands.arguments import folder_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
+from evoexp.commands.list_ import run_row, run_table
 from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -31,26 +29,11 @@ from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.pages import page_registration
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import summary_table as stored_summaries
 
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
   evoexp list                                       # all {number} experiments, and stored runs"""
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_experiment_arguments(parser)
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="run replicates again that failed before"
-    )
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="show how the replicates converge while they run (on a terminal)",
-    )
-    parser.add_argument("--no-report", action="store_true", help="run only; draw nothing")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -75,19 +58,10 @@ def main(arguments: argparse.Namespace) -> int:
         for labelled in _that_can_run(experiment)
     ]
     runner = experiments[0].runner
-    if arguments.live and runner.backend != "loky":
-        raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
-    with contextlib.ExitStack() as stack:
-        curves = None
-        if arguments.live:
-            folder = tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True)
-            curves = Path(stack.enter_context(folder))
-        batch = Batch(
-            wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
-        )
-        batch.prepare()
-        left = batch.num_left_failed
-        failures = _run(batch, wanted, curves)
+    batch = Batch(wanted, runner, outputs_root(), retry_failed=arguments.retry_failed)
+    batch.prepare()
+    left = batch.num_left_failed
+    failures = _run(batch, wanted)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         say(f"{which}: evoexp list --failed; run again with --retry-failed")
@@ -110,9 +84,7 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
     return [each for each in experiment.conditions if not lacks[each.label]]
 
 
-def _run(
-    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
-) -> list[Outcome]:
+def _run(batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]]) -> list[Outcome]:
     """Run what is missing; return the replicates that failed."""
     if not batch.jobs:
         if batch.is_damaged:
@@ -124,9 +96,7 @@ def _run(
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
     failures, counts = [], Counter(job.condition_id for job in batch.jobs)
     labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    progress = BatchProgress(
-        plain_console(), {key: (labels[key], counts[key]) for key in counts}, curves
-    )
+    progress = BatchProgress(plain_console(), {k: (labels[k], counts[k]) for k in counts})
     with progress.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
             progress.advance(outcome)
@@ -187,31 +157,19 @@ def summary_table(experiment: Experiment) -> Table:
 
     As the report, it has all stored replicates, also those beyond the number that is asked for.
     """
-    numbers = right("replicates", "solved /\ncertified", "median\nbest cost", "CPU s\neach")
-    table = new_table(experiment.report_name, "condition", hash_column(), *numbers)
+    rows, caption = [], None
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
-        rows = stored_summaries(run)
-        planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
-        names = ["solved", "certified", "best_cost", "cpu_s", "status", "clearance"]
-        columns = rows.select(names).to_pylist()
-        done = [row for row in columns if row["status"] == "done"]
-        moved = [row for row in done if not math.isnan(row["clearance"])]
-        solved = sum(row["solved"] for row in done)
-        certified = str(sum(row["certified"] is True for row in moved)) if moved else "–"
-        table.add_row(
-            label,
-            condition.id[:12],
-            f"{len(done)} of {planned}",
-            f"{solved} / {certified}",
-            f"{np.median([row['best_cost'] for row in done]):.4g}" if done else "–",
-            f"{np.median([row['cpu_s'] for row in done]):.3f}" if done else "–",
-        )
+        asked = condition.num_replicates(experiment.num_replicates)
+        named = {"experiment": "", "label": label, "budget": "", "changed": False}
+        rows.append(run_row(run.hash12, run) | named | {"planned": run.num_planned(asked)})
         if experiment.budget_of(label) == "smoke":
-            table.caption = "budget=smoke shows that everything runs; its numbers decide nothing"
-        if planned > condition.num_replicates(experiment.num_replicates):
-            asked = experiment.num_replicates
-            table.caption = f"of {asked} asked for: all that are stored, here and in the report"
+            caption = "budget=smoke shows that everything runs; its numbers decide nothing"
+        if rows[-1]["planned"] > asked:
+            all_of = "all that are stored, here and in the report"
+            caption = f"of {experiment.num_replicates} asked for: {all_of}"
+    table = run_table(experiment.report_name, rows)
+    table.caption = caption
     return table
 
 

@@ -1,20 +1,27 @@
-"""`evoexp show`: a condition before it is run, a stored run, or somebody's log."""
+"""`evoexp show`: a condition before it is run, a stored run, or somebody's log.
+
+The facts about each are one mapping with the keys of `KEYS`, which `--json` prints as it is.
+"""
 
 import argparse
 import functools
+import hashlib
 import itertools
+import math
 import shlex
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 from rich.table import Table
 
-from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
+from evoexp import shipped
+from evoexp.attachments import PREFIX, keep_all
+from evoexp.commands.arguments import folder_words, is_override
 from evoexp.commands.console import (
-    coloured,
     hash_column,
     new_table,
     plain_console,
@@ -22,40 +29,38 @@ from evoexp.commands.console import (
     right,
     say,
 )
-from evoexp.commands.facts import KEYS, composed_facts, log_facts, stored_facts
+from evoexp.commands.list_ import run_row, run_table
 from evoexp.commands.pack import in_archive, looked_into
 from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.condition import Condition, stored_config
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.errors import SettingError, printable
+from evoexp.errors import EvoexpError, SettingError, printable
+from evoexp.records import flatten
+from evoexp.registry import COMPONENTS, components_in, lacking, registered
 from evoexp.store.identity import TAKEN
-from evoexp.store.run_context import typed_parts
-from evoexp.store.run_directory import RunDirectory
-from evoexp.store.summaries import summary_table
+from evoexp.store.log_reader import LogContents, read_log
+from evoexp.store.manifest import differences, environment, leaves
+from evoexp.store.run_context import ORIGIN, origin_of, typed_parts
+from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
 
+REPLICATE = {  # columns of the table of replicates, and their heads
+    **{"replicate": "#", "status": "status", "best_cost": "best cost", "solved": "solved"},
+    **{"certified": "certified", "clearance": "clearance", "evaluations": "evaluations"},
+    **{"cpu_s": "CPU s"},
+}
 MAX_CHANGES = 6  # settings per row of a table of conditions
 INDENT = 13  # columns of the names on the left
 VERSIONS = ("python", "evoexp", "numpy", "numba", "pin", "coal")  # those on the screen
 MAX_LINES = 3  # of one entry; `show --all` prints everything
-MAX_ENTRIES = 4  # of one kind: names, differences, failures
+MAX_ENTRIES = 4  # of a list
 WHOLE = ("condition", "origin", "environment", "result", "verdict", "note")  # never cut
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "HASH | LOG.mcap | RUNS.tar[:HASH] | KEY=VALUE", "+"
-    words.help = (
-        "any unique prefix of a run's hash, a replicate's log, an archive of runs, which is looked "
-        "into, or an experiment with overrides as for run, which is composed and not run"
-    )
-    parser.add_argument(
-        "--all", action="store_true", help="all settings, replicates and the whole manifest, too"
-    )
-    keys = "; ".join(f"{key}: {value}" for key, value in KEYS.items())
-    content = f"print JSON, one object or a list of them. Keys: {keys}"
-    parser.add_argument("--json", action="store_true", help=content)
+KEYS = (  # of the facts, in the order of the screen; commands.yaml tells their values
+    *("condition", "shipped_as", "components", "origin", "environment", "result", "verdict"),
+    *("settings", "notes"),
+)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -67,36 +72,24 @@ def main(arguments: argparse.Namespace) -> int:
         swept = ["-m"] if arguments.multirun else []
         command = ["evoexp", "run", *swept, *words, *folder_words(arguments.config_dir)]
         labelled = [(each, label) for each in experiments for label, _ in each.conditions]
-        is_table = as_table and len(labelled) > 1  # which has no notes
-        found = [
-            composed_facts(
-                experiment, label, shlex.join([*command, "--only", label]), noted=not is_table
-            )
-            for experiment, label in labelled
-        ]
-        if is_table:
+        if as_table and len(labelled) > 1:
             for experiment in experiments:
-                say(_condition_table(experiment, found))
+                say(_condition_table(experiment))
             say("one condition on a screen: --only LABEL")
         else:
+            found = [
+                composed_facts(experiment, label, shlex.join([*command, "--only", label]))
+                for experiment, label in labelled
+            ]
             _print_screens(arguments, found)
     elif packed := in_archive(" ".join(words)):
         path, prefix = packed
         with looked_into(path, prefix) as runs:
-            found = [stored_facts(run) for run in runs]
-            for facts in found:
-                facts["origin"]["directory"] = str(path)
-            if len(found) > 1 and as_table:
-                counted = right("done", "solved")
-                table = new_table("", hash_column(), "experiment", "condition", *counted)
-                for facts in found:
-                    origin, result = facts["origin"], facts["result"] or {"done": 0, "solved": 0}
-                    names = (str(origin.get(name) or "–") for name in ("experiment", "label"))
-                    counts = (str(result[name]) for name in ("done", "solved"))
-                    table.add_row(facts["condition"][:12], *names, *counts)
-                say(table)
+            if as_table and len(runs) > 1:
+                say(run_table("", [run_row(run.hash12, run) for run in runs]))
                 say(f"one run on a screen: evoexp show {printable(str(path))}:{runs[0].hash12}")
             else:
+                found = [stored_facts(run, str(path)) for run in runs]
                 _print_screens(arguments, found, runs)
     elif len(words) > 1:
         raise SettingError("show", "given one hash or log", " ".join(words))
@@ -105,7 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
     else:
         run = stored_or_shipped(words[0])
         if isinstance(run, RunDirectory):
-            _print_screens(arguments, [stored_facts(run)], [run])
+            _print_screens(arguments, [stored_facts(run, str(run.path))], [run])
         else:
             facts = composed_facts(shipped_experiment(run), run.label, run.command)
             _print_screens(arguments, [facts])
@@ -127,60 +120,181 @@ def _print_screens(
         if arguments.all:
             say(as_yaml({"settings": facts["settings"]}))
             if run is not None:
-                say(_replicate_table(run))
+                heads, last = right(*REPLICATE.values()), "digest, or why it failed"
+                table = new_table(f"replicates in {run.path}", *heads, last)
+                for row in summary_table(run).to_pylist():
+                    cells = ["–" if row[k] is None else _said(row[k]) for k in REPLICATE]
+                    table.add_row(*cells, row["digest"] or row["stop_reason"])
+                say(table)
                 manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
                 say(as_yaml({"manifest": manifest}))
 
 
-def _condition_table(experiment: Experiment, found: list[dict[str, Any]]) -> Table:
+def _condition_table(experiment: Experiment) -> Table:
     """Return a table of an experiment's conditions and the settings in which they differ."""
-    by_id = {facts["condition"]: facts for facts in found}
-    rows = [(label, by_id[condition.id]) for label, condition in experiment.conditions]
-    settings = [dict(_leaves(typed_parts(facts["settings"]))) for _, facts in rows]
+    settings = []
+    for _, condition in experiment.conditions:
+        if not shipped.rows_of(condition.id) and not lacking(condition.to_json()):
+            condition.prepare()  # raises where the parts do not fit
+        settings.append(dict(leaves(typed_parts(stored_config(condition.to_json())))))
     names = list(dict.fromkeys(itertools.chain.from_iterable(settings)))
+    names = [name for name in names if not name.endswith("revision")]
     differing = [name for name in names if len({str(each.get(name)) for each in settings}) > 1]
     heads = hash_column(), *right("done")
-    name, last = experiment.report_name, "settings in which they differ"
-    table = new_table(name, "condition", *heads, last)
-    for (label, facts), values in zip(rows, settings, strict=True):
+    last = "settings in which they differ"
+    table = new_table(experiment.report_name, "condition", *heads, last)
+    for (label, condition), values in zip(experiment.conditions, settings, strict=True):
         given = [f"{name}={compact(values[name])}" for name in differing if name in values]
         more = [f"… {len(given) - MAX_CHANGES} more"] if len(given) > MAX_CHANGES else []
-        result = facts["result"]
-        done = f"{result['done']} of {result['planned']}" if result else "–"
-        changes = "\n".join([*given[:MAX_CHANGES], *more])
-        table.add_row(label, facts["condition"][:12], done, changes)
+        run = RunDirectory(outputs_root(), condition.id)
+        planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
+        done = f"{len(run.completed())} of {planned}" if run.completed() or run.failed() else "–"
+        table.add_row(label, run.hash12, done, "\n".join([*given[:MAX_CHANGES], *more]))
     return table
 
 
-def _replicate_table(run: RunDirectory) -> Table:
-    """Return one row per replicate, done or failed."""
-    numbers = right("best cost", "solved", "certified", "clearance", "evaluations", "CPU s")
-    table = new_table(
-        f"replicates in {run.path}", *right("#"), "status", *numbers, "digest, or why it failed"
-    )
-    for row in summary_table(run).to_pylist():
-        if row["status"] != "done":
-            failed = coloured("failed", "red")
-            table.add_row(str(row["replicate"]), failed, *6 * ["–"], str(row["stop_reason"]))
-            continue
-        verdict = ["–" if row[name] is None else str(row[name]) for name in ("solved", "certified")]
-        effort = [f"{row['clearance']:.4g}", str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
-        cells = [f"{row['best_cost']:.6g}", *verdict, *effort]
-        table.add_row(str(row["replicate"]), "done", *cells, str(row["digest"]))
-    return table
+# the facts
 
 
-def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield every setting by its dotted name; lists of scalars are one setting."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            if key != "revision":
-                yield from _leaves(item, f"{name}.{key}".lstrip("."))
-    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
-        for k, item in enumerate(value):
-            yield from _leaves(item, f"{name}.{k}")
-    else:
-        yield name, value
+def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
+    """Return the facts about one condition of an experiment, which a command runs."""
+    condition = next(each.condition for each in experiment.conditions if each.label == label)
+    if not lacking(condition.to_json()):  # else a note says how to install it
+        condition.notes()  # raises where the parts do not fit
+    run = RunDirectory(outputs_root(), condition.id)
+    rows = summary_table(run).to_pylist() if run.completed() or run.failed() else []
+    planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
+    around = run.manifest() if rows else None
+    origin = experiment.origin(label, command)
+    return _facts(condition.to_json(), origin, around, rows, {"planned": planned})
+
+
+def stored_facts(run: RunDirectory, place: str) -> dict[str, Any]:
+    """Return the facts about a stored run; an archive's command is none to be typed."""
+    manifest = run.manifest()
+    origin = {TAKEN: manifest.get(TAKEN), **{name: origin_of(run)[name] for name in ORIGIN}}
+    if TAKEN not in manifest:
+        origin["command"] = manifest.get("command")
+    origin |= {"options": manifest.get("options"), "code": manifest.get("git"), "directory": place}
+    log = next((read_log(run.log_path(k)) for k in sorted(whole_logs(run))[:1]), None)
+    rows = summary_table(run).to_pylist()
+    return _facts(run.config_json(), origin, manifest, rows, _arrays(log) if log else {})
+
+
+def log_facts(path: Path) -> dict[str, Any]:
+    """Return the facts about a replicate's log, wherever it comes from."""
+    log = read_log(path)
+    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
+    result = {
+        "digest": log.summary.digest,
+        "generations": len(log.generations) - 1,
+        "stop_reason": log.summary.stop_reason,
+    }
+    origin = {"log": str(path), "replicate": log.replicate}
+    rows = [flatten(log.summary)]
+    return _facts(log.config_json, origin, log.environment, rows, result | _arrays(log))
+
+
+def _arrays(log: LogContents) -> dict[str, Any]:
+    return {"arrays": {name: list(array.shape) for name, array in log.arrays().items()}}
+
+
+def _facts(
+    config_json: bytes,
+    origin: dict[str, Any],
+    around: Mapping[str, Any] | None,
+    rows: Sequence[dict[str, Any]],
+    result: dict[str, Any],
+) -> dict[str, Any]:
+    """Return the facts of all keys."""
+    try:
+        notes = Condition.from_json(config_json).notes()
+    except EvoexpError as error:  # of another revision, or a package that is not installed
+        notes = [str(error)]
+    config = stored_config(config_json)
+    condition_id = hashlib.sha256(config_json).hexdigest()
+    stored = None if around is None else {k: around.get(k) for k in ("versions", "platform", "cpu")}
+    if stored is not None:
+        stored["differences"] = [str(each) for each in differences(stored, environment())]
+    return {
+        "condition": condition_id,
+        "shipped_as": [
+            {"experiment": row.experiment, "label": row.label, "budget": row.budget}
+            for row in shipped.rows_of(condition_id)
+        ],
+        "components": list(_components(config)),
+        "origin": {name: value for name, value in origin.items() if value},
+        "environment": stored,
+        "result": _result(rows) | result if rows else None,
+        "verdict": _verdict([row for row in rows if row["status"] == "done"]) if rows else None,
+        "settings": config,
+        "notes": notes,
+    }
+
+
+def _components(config: Any) -> Iterator[dict[str, Any]]:
+    """Yield every component once, with its revision here and as stored, and its package."""
+    revisions: dict[str, Any] = {}
+    for _, settings in components_in(config):
+        revisions.setdefault(str(settings[TARGET]), settings.get("revision"))
+    for name, revision in revisions.items():
+        registration = registered(COMPONENTS, name)
+        yield {
+            "component": name,
+            "revision": revision,
+            "installed_revision": registration and registration.load().revision,
+            "package": registration and registration.package,
+        }
+
+
+def _result(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return counts, costs and effort of replicates."""
+    done = [row for row in rows if row["status"] == "done"]
+    failed = [row for row in rows if row["status"] != "done"]
+    best = min(done, key=lambda row: row["best_cost"], default=None)
+    names = ("best_cost", "evaluations", "collision_queries", "cpu_s")
+    medians = [float(np.median([row[name] for row in done])) if done else None for name in names]
+    return {
+        "planned": None,
+        "done": len(done),
+        "failed": len(failed),
+        "failures": [
+            {"replicate": row["replicate"], "reason": row["stop_reason"]} for row in failed
+        ],
+        "solved": sum(bool(row["solved"]) for row in done),
+        "best_cost": best and best["best_cost"],
+        "best_replicate": best and best["replicate"],
+        **{f"median_{n.removeprefix('best_')}": m for n, m in zip(names, medians, strict=True)},
+    }
+
+
+def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return how many motions the exact certifier accepts, and the closest approach of all."""
+    moved = [row for row in rows if not math.isnan(row["clearance"])]
+    near = min(moved, key=lambda row: row["clearance"], default=None) or {}
+    pairs = dict.fromkeys(p for row in moved for p in row["allowed_contacts"].split(", ") if p)
+    allowed = (row for row in moved if row["allowed_contacts"])
+    deepest = max(allowed, key=lambda row: row["penetration"], default=None) or {}
+    return {
+        "certified": sum(row["certified"] is True for row in moved),
+        "refuted": sum(row["certified"] is False for row in moved),
+        "undecided": sum(row["certified"] is None for row in moved),
+        "without_motion": len(rows) - len(moved),
+        "certified_margin": sum(row["certified_margin"] is True for row in moved),
+        "clearance": near.get("clearance"),
+        "clearance_replicate": near.get("replicate"),
+        "clearance_pair": near.get("clearance_pair"),
+        "contacts": [
+            {key: row[key] for key in ("replicate", "refuted_at", "refuted_pair")}
+            for row in moved
+            if row["refuted_at"] is not None
+        ],
+        "allowed_contacts": list(pairs),
+        "penetration": deepest.get("penetration"),
+        "penetration_replicate": deepest.get("replicate"),
+        "penetration_pair": deepest.get("penetration_pair"),
+        "length_unit": rows[0]["length_unit"] if rows else None,
+    }
 
 
 # one screen
@@ -188,7 +302,27 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
 
 def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
     """Yield the facts about a condition as aligned lines."""
-    for name, text in _entries(facts):
+    options = facts["origin"].get("options", {})
+    places = {option["origin"]: "" for option in options.values()}
+    for group, option in options.items():
+        places[option["origin"]] += f" {group}={option['name']}"
+    shown = {**facts, "origin": facts["origin"] | {"options": places}}
+    if code := facts["origin"].get("code"):
+        changed = ", changed" if code.get("dirty") else ""
+        shown["origin"]["code"] = f"{str(code.get('commit'))[:12]}{changed}"
+    if around := facts["environment"]:
+        versions = {name: (around["versions"] or {}).get(name) for name in VERSIONS}
+        cpu = (around["cpu"] or {}).get("name")
+        shown["environment"] = around | {"versions": versions, "cpu": cpu}
+    shown["components"] = ", ".join(map(_component, facts["components"]))
+    if facts["result"] is None:
+        shown["result"] = f"not run here; run it: {shown['origin'].pop('command')}"
+    keys = [key for key in KEYS[:-2] if key != "shipped_as" or facts[key]]
+    named = [(key.replace("_", " "), _said(shown[key]) if shown[key] else "–") for key in keys]
+    parts = typed_parts(facts["settings"]).items()
+    named += [(name, compact(component)) for name, component in parts]
+    named += [("note", note) for note in facts["notes"]]
+    for name, text in named:
         room = max(width - INDENT, 30)
         lines = [
             line
@@ -201,141 +335,27 @@ def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
             yield f"{'' if k else name:{INDENT}}{line}".rstrip()
 
 
-def _entries(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield name and text of every entry."""
-    yield "condition", facts["condition"]
-    if facts["shipped_as"]:
-        named = (f"{s['experiment']}, {s['label']}, {s['budget']}" for s in facts["shipped_as"])
-        yield "shipped as", _first("; ", list(named))
-    yield "components", ", ".join(map(_component, facts["components"]))
-    yield "origin", "\n".join(_origin(facts["origin"], facts["result"] is not None))
-    yield "environment", "\n".join(_environment(facts["environment"]))
-    yield "result", "\n".join(_result(facts["result"], facts["origin"]))
-    yield "verdict", "\n".join(_verdict(facts["verdict"]))
-    for name, component in typed_parts(facts["settings"]).items():
-        yield name, compact(component)
-    for note in facts["notes"]:
-        yield "note", note
-
-
-def _first(separator: str, texts: Sequence[str]) -> str:
-    """Join the first texts, and say how many more there are."""
-    more = len(texts) - MAX_ENTRIES
-    return separator.join(texts[:MAX_ENTRIES]) + (f" and {more} more" if more > 0 else "")
-
-
 def _component(component: Mapping[str, Any]) -> str:
     """Say a component's revision, and its package unless it is evoexp's own."""
-    text = f"{component['component']} {component['revision']}"
-    installed, package = component["installed_revision"], component["package"]
-    if package is None:
-        return f"{text} (not installed here)"
-    if installed != component["revision"]:
-        text += f" (here {installed})"
-    return text if package.startswith("evoexp ") else f"{text} ({package})"
+    revision, package = component["revision"], component["package"] or "not installed here"
+    here = component["installed_revision"]
+    remarks = [f"here {here}"] if here not in (None, revision) else []
+    remarks += [] if package.startswith("evoexp ") else [package]
+    text = f"{component['component']} {revision}"
+    return f"{text} ({', '.join(remarks)})" if remarks else text
 
 
-def _origin(origin: Mapping[str, Any], was_run: bool) -> Iterator[str]:
-    """Yield the origin: names, options by the places they come from, the command, files."""
-    names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
-    if origin.get("budget"):
-        names.append(f"budget {origin['budget']}")
-    if archive := origin.get(TAKEN):
-        yield f"out of {archive}, according to which this is:"
-    if names:
-        yield ", ".join(names)
-    places: dict[str, list[str]] = {}
-    for group, option in (origin.get("options") or {}).items():
-        places.setdefault(option["origin"], []).append(f"{group}={option['name']}")
-    for place, options in places.items():
-        yield f"{place}: {' '.join(options)}"
-    if was_run and origin.get("command") and not archive:  # somebody's command is none to be typed
-        yield origin["command"]
-    if origin.get("log"):
-        yield f"{origin['log']}, replicate {origin['replicate']}"
-    if code := origin.get("code"):
-        yield f"commit {str(code.get('commit'))[:12]}" + (", changed" if code.get("dirty") else "")
-    if origin.get("directory"):
-        yield f"stored in {origin['directory']}"
-
-
-def _environment(environment: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield versions, processor, and the differences from the environment here."""
-    if environment is None:
-        yield "–"
-        return
-    versions, platform = environment.get("versions") or {}, environment.get("platform") or {}
-    yield ", ".join(f"{name} {versions[name]}" for name in VERSIONS if versions.get(name))
-    cpu = (environment.get("cpu") or {}).get("name")
-    yield ", ".join(str(part) for part in (*platform.values(), cpu) if part)
-    if differing := environment["differences"]:
-        yield _first("\n", [f"not as here: {each}" for each in differing])
-
-
-def _result(result: Mapping[str, Any] | None, origin: Mapping[str, Any]) -> Iterator[str]:
-    """Yield replicates, costs and effort; or the command that runs the condition."""
-    if result is None:
-        yield f"not run here; run it: {origin['command']}"
-        return
-    if origin.get("log"):
-        stopped = result["stop_reason"]
-        solved = "solved" if result["solved"] else "not solved"
-        reason = f" ({stopped})" if stopped != "generations" else ""
-        yield f"{solved} after {result['generations']} generations{reason}"
-        yield f"digest {result['digest']}"
-    else:
-        planned = f" of {result['planned']}" if result["planned"] is not None else ""
-        failed = f", {result['failed']} failed" if result["failed"] else ""
-        yield f"{result['done']}{planned} replicates done{failed}, {result['solved']} solved"
-    if result["done"]:
-        several = f", median {_number(result['median_cost'])}" if result["done"] > 1 else ""
-        best = f"best cost {_number(result['best_cost'])} (replicate {result['best_replicate']})"
-        yield best + several
-        yield (
-            f"each {_number(result['median_evaluations'])} evaluations, "
-            f"{_number(result['median_collision_queries'])} collision queries, "
-            f"{result['median_cpu_s']:.3g} s CPU"
-        )
-    for name, shape in (result.get("arrays") or {}).items():
-        yield f"array {name}: {' × '.join(map(str, shape))}"
-    if result["failures"]:
-        yield _first(
-            "\n", [f"replicate {f['replicate']}: {f['reason']}" for f in result["failures"]]
-        )
-
-
-def _verdict(verdict: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield the certifier's counts, the closest approach, and the first contacts."""
-    if verdict is None:
-        yield "–"
-        return
-    counts = [f"{verdict[name]} {name}" for name in ("certified", "refuted", "undecided")]
-    if verdict["without_motion"]:
-        counts.append(f"{verdict['without_motion']} without a motion")
-    kept, certified = verdict["certified_margin"], verdict["certified"]
-    yield ", ".join(counts) + f"; required margin kept by {kept} of the {certified} certified"
-    if verdict["clearance"] is not None:
-        yield f"least clearance {_place(verdict, 'clearance')}"
-    if verdict["allowed_contacts"]:
-        yield f"may touch: {', '.join(verdict['allowed_contacts'])}"
-        yield f"deepest overlap of these {_place(verdict, 'penetration')}"
-    if verdict["contacts"]:
-        contacts = [
-            f"replicate {c['replicate']} touches at {c['refuted_at']:.4g} ({c['refuted_pair']})"
-            for c in verdict["contacts"]
-        ]
-        yield _first("\n", contacts)
-
-
-def _place(verdict: Mapping[str, Any], name: str) -> str:
-    """Say a distance, with the replicate and the pair of bodies that have it."""
-    pair = f" ({verdict[f'{name}_pair']})" if verdict[f"{name}_pair"] else ""
-    unit, replicate = verdict["length_unit"], verdict[f"{name}_replicate"]
-    return f"{_number(verdict[name])} {unit}, replicate {replicate}{pair}"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.6g}"
+def _said(fact: Any) -> str:
+    """Say a fact: plain values of a mapping in one line, then a line for each list and mapping."""
+    if isinstance(fact, list):
+        more = f" and {len(fact) - MAX_ENTRIES} more" if len(fact) > MAX_ENTRIES else ""
+        return "; ".join(map(_said, fact[:MAX_ENTRIES])) + more
+    if not isinstance(fact, Mapping):
+        return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
+    told = {k.replace("_", " "): v for k, v in fact.items() if v or v == 0}
+    plain = [f"{k} {_said(v)}" for k, v in told.items() if not isinstance(v, list | Mapping)]
+    rest = [f"{k}: {_said(v)}" for k, v in told.items() if isinstance(v, list | Mapping)]
+    return "\n".join([", ".join(plain), *rest] if plain else rest)
 
 
 def compact(value: Any) -> str:

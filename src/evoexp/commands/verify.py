@@ -5,16 +5,15 @@ import contextlib
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
 from evoexp.commands.stored_runs import stored_run
 from evoexp.store.identity import CONFIG
-from evoexp.store.integrity import LogCheck, RunCheck, check_log, check_rows, check_run
-from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, run_names
+from evoexp.store.integrity import DELETE, LogCheck, RunCheck, check_log, check_run
+from evoexp.store.run_directory import COMMAND, outputs_root, run_names
+from evoexp.store.summaries import altered
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
 MANY = 200  # logs, likewise: their solutions are evaluated
@@ -22,29 +21,7 @@ PART = 64  # logs per task of a worker
 SHOWN = 4  # problems of a run
 
 
-class Checked(NamedTuple):
-    """A run with everything that was found: what `--json` prints."""
-
-    hash: str  # its first twelve digits
-    logs: int  # that were looked at
-    problems: dict[str, str]  # file → what is wrong with it
-    leftovers: list[str]  # files that are no part of a run
-    mend: str  # the command that mends it; empty if nothing is wrong or no command does
-    unevaluated: str  # why solutions of logs could not be evaluated; empty if all were
-
-
-RUN_KEYS = Checked._fields
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument(
-        "hashes",
-        nargs="*",
-        metavar="HASH",
-        help="any unique prefixes of runs' hashes; by default every stored run",
-    )
-    add_json_argument(parser, f"a list of all runs that were checked ({', '.join(RUN_KEYS)})")
+RUN_KEYS = [name for name in RunCheck._fields if name != "run"]
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -60,7 +37,7 @@ def main(arguments: argparse.Namespace) -> int:
         found = [_checked(each, logs) for each, logs in zip(checks, _all_logs(checks), strict=True)]
     damaged = [run for run in found if run.problems]
     if arguments.json:
-        print_json([run._asdict() for run in found])
+        print_json([{name: getattr(run, name) for name in RUN_KEYS} for run in found])
         return 1 if damaged else 0
     if damaged:
         title = f"damaged runs in {outputs}"
@@ -68,7 +45,7 @@ def main(arguments: argparse.Namespace) -> int:
         for run in damaged:
             lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
             rest = [f"… {len(lines) - SHOWN} more"] if lines[SHOWN:] else []
-            table.add_row(run.hash[:HASH_LENGTH], str(run.logs), "\n".join(lines[:SHOWN] + rest))
+            table.add_row(run.hash, str(run.logs), "\n".join(lines[:SHOWN] + rest))
         say(table)
         for mend in dict.fromkeys(run.mend for run in damaged if run.mend):
             say(f"mend: {mend}")
@@ -115,14 +92,17 @@ def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:
     return [check_log(path, condition_id, contradictions) for path in paths]
 
 
-def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
+def _checked(found: RunCheck, logs: list[LogCheck]) -> RunCheck:
+    """Return a run with the problems of its logs, and the command that mends it, if one does."""
     problems = found.problems | {log.name: log.problem for log in logs if log.problem}
-    if found.run is not None:
-        problems |= check_rows(found.run, logs)
     mend = ""
+    if found.run is not None:
+        whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
+        if problem := altered(found.run, whole):
+            problems["summary.parquet"] = problem + DELETE
     if problems and (found.run or CONFIG in problems):  # else nothing of it can be read
         known = found.run.command if found.run else COMMAND
-        rows = shipped.find(found.name) if known == COMMAND else []
+        rows = shipped.find(found.hash) if known == COMMAND else []
         mend = rows[0].command if rows else known
     unevaluated = next((log.unevaluated for log in logs if log.unevaluated), "")
-    return Checked(found.name, len(logs), problems, found.leftovers, mend, unevaluated)
+    return found._replace(problems=problems, logs=len(logs), mend=mend, unevaluated=unevaluated)

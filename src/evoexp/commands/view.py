@@ -2,13 +2,8 @@
 
 import argparse
 
-from evoexp.commands.chosen_motions import add_motion_arguments, output_path, recordings, write
+from evoexp.commands.chosen_motions import output_path, recordings, write
 from evoexp.playback.player_page import page
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_motion_arguments(parser, ".html")
 
 
 def main(arguments: argparse.Namespace) -> int:

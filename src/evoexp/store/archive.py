@@ -22,13 +22,13 @@ from evoexp.input_files import MAX_INPUT, MEGABYTE
 from evoexp.store.files import write_file, write_files
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, TAKEN
 from evoexp.store.log_bounds import MAX_LOG
-from evoexp.store.log_reader import checked_summary
+from evoexp.store.log_reader import read_summary
 from evoexp.store.run_directory import HASH_LENGTH, RunDirectory
 
 MOST_FILES = 2_000_000  # of an archive
 MOST_WAITING = 64 * MEGABYTE  # [B] of logs that are taken in together
 MAX_TEXT = 8 * MEGABYTE  # [B] of a configuration, a manifest, or plans
-_PIECE = MEGABYTE  # [B] that are read at once
+_TEXTS = (CONFIG, MANIFEST, PLANS)
 _PLAIN = (tarfile.REGTYPE, tarfile.AREGTYPE)
 _COMPRESSED = {
     b"\x1f\x8b": "gzip",
@@ -67,14 +67,14 @@ def pack(runs: Sequence[RunDirectory], path: Path) -> int:
             for run in sorted(runs, key=lambda each: each.condition_id):
                 run.config_json()  # checked, with the files that it refers to
                 root = f"runs/{run.hash12}/"
-                beside = [run.path / name for name in (CONFIG, MANIFEST, PLANS)]
+                beside = [run.path / name for name in _TEXTS]
                 beside += sorted((run.path / PREFIX).glob("[0-9a-f]*"))
                 for each in beside:
                     if each.is_file():
                         _add(archive, root + str(each.relative_to(run.path)), each.read_bytes())
                 for replicate in sorted(run.completed()):
                     log = run.log_path(replicate)
-                    checked_summary(log, run.condition_id, replicate)
+                    read_summary(log, (run.condition_id, replicate))
                     _add(archive, f"{root}{REPLICATES}/{log.name}", log.read_bytes())
                     count += 1
         partial.replace(path)
@@ -94,24 +94,15 @@ def take_in(path: Path, outputs: Path) -> list[TakenRun]:
 
     ArchiveError says that it is none, or damaged; what came before the damage is taken.
     """
-    arrivals: dict[str, _Arrival] = {}
-    shown = printable(str(path))
+    shown, runs = printable(str(path)), dict[str, dict[str, tarfile.TarInfo]]()
     try:
         with open(path, "rb") as file:
-            for entry in list(_entries(file)):
-                place = _BESIDE.fullmatch(entry.name) or _LOG.fullmatch(entry.name)
-                assert place is not None, "its name was matched"
-                hash12, rest = place.groups()
-                content, sha256 = _content(file, entry)
-                if hash12 in arrivals:
-                    arrivals[hash12].add(rest, content, sha256)
-                elif rest == CONFIG:
-                    arrivals[hash12] = _Arrival(path, outputs, hash12, content)
-                else:
-                    raise ArchiveError(f"damaged: {entry.name} comes before {CONFIG}")
-        if not arrivals:
-            raise ArchiveError("no archive of runs: it is empty")
-        return [arrival.finish() for arrival in arrivals.values()]
+            for entry in _entries(file):
+                _, hash12, name = entry.name.split("/", 2)
+                runs.setdefault(hash12, {})[name] = entry
+            if not runs:
+                raise ArchiveError("no archive of runs: it is empty")
+            return [_taken(file, *each, path.name, outputs) for each in runs.items()]
     except ArchiveError as error:
         raise ArchiveError(f"{shown}: {error}") from None
     except OSError as error:
@@ -121,81 +112,53 @@ def take_in(path: Path, outputs: Path) -> list[TakenRun]:
         raise ArchiveError(f"{shown}: cannot be read ({reason})") from None
 
 
-class _Arrival:
-    """One run of an archive on its way into a store."""
-
-    def __init__(self, path: Path, outputs: Path, hash12: str, config_json: bytes) -> None:
-        condition_id = hashlib.sha256(config_json).hexdigest()
-        if condition_id[:HASH_LENGTH] != hash12:
-            raise ArchiveError(f"damaged: {CONFIG} of run {hash12} has another hash")
-        self.run = RunDirectory(outputs, condition_id)
-        self._archive, self._beside = path.name, {CONFIG: config_json}
-        self._waiting: dict[int, bytes] = {}
-        self._size = self._added = self._kept = 0
-        self._begun = False
-
-    def add(self, name: str, content: bytes, sha256: str) -> None:
-        """Take a file in: a log later and with others, one that the configuration names at once."""
-        if name.isdecimal():
-            self._add_log(int(name), content)
-        elif name == MANIFEST:
-            try:
-                notes: Any = json.loads(content)
-            except (ValueError, RecursionError):
-                notes = None
-            if not isinstance(notes, dict):
-                text = f"damaged: {MANIFEST} of run {self.run.hash12} is no JSON object"
-                raise ArchiveError(text)
-            marked = notes | {TAKEN: printable(self._archive.replace("\n", " "))}
-            self._beside[name] = json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
-        elif name == PLANS:
-            self._beside[name] = content
-        elif name != PREFIX + sha256 or sha256.encode() not in self._beside[CONFIG]:
-            what = "does not have the hash that is its name, or its run does not refer to it"
-            raise ArchiveError(f"damaged: {name[:30]}… {what}")
-        elif not (place := self.run.path / name).exists():
-            with self.run.lock():
-                place.parent.mkdir(exist_ok=True)
-                write_file(place, content)
-
-    def _add_log(self, replicate: int, content: bytes) -> None:
-        self._begin()
-        if replicate in self.run.completed():
-            self._kept += 1
-            return
+def _taken(
+    file: BinaryIO, hash12: str, entries: dict[str, tarfile.TarInfo], archive: str, outputs: Path
+) -> TakenRun:
+    """Take one run of an archive into a store: what it refers to, its configuration, its logs."""
+    if CONFIG not in entries:
+        raise ArchiveError(f"no archive of runs: run {hash12} is without {CONFIG}")
+    beside = {name: _content(file, entries[name]) for name in _TEXTS if name in entries}
+    run = RunDirectory(outputs, hashlib.sha256(beside[CONFIG]).hexdigest())
+    if run.hash12 != hash12:
+        raise ArchiveError(f"damaged: {CONFIG} of run {hash12} has another hash")
+    if MANIFEST in beside:
         try:
-            checked_summary(content, self.run.condition_id, replicate)
-        except CorruptLog as error:
-            name = f"{self.run.hash12}, replicate {replicate}"
-            raise ArchiveError(f"damaged: {name}: {error}") from None
-        self._waiting[replicate] = content
-        self._size += len(content)
-        if self._size >= MOST_WAITING:
-            self._write()
-
-    def finish(self) -> TakenRun:
-        """Write the logs that wait."""
-        self._begin()
-        self._write()
-        return TakenRun(self.run, self._added, self._kept)
-
-    def _begin(self) -> None:
-        """Write configuration, manifest and plans, where they are not there."""
-        if self._begun:
-            return
-        self._begun = True
-        files = {self.run.path / name: content for name, content in self._beside.items()}
-        with self.run.lock():
-            self.run.replicates.mkdir(parents=True, exist_ok=True)
-            write_files({place: each for place, each in files.items() if not place.exists()})
-            self.run.check()
-
-    def _write(self) -> None:
-        if self._waiting:
-            with self.run.lock():
-                self.run.write_logs(self._waiting)
-        self._added += len(self._waiting)
-        self._waiting, self._size = {}, 0
+            notes: Any = json.loads(beside[MANIFEST])
+        except (ValueError, RecursionError):
+            notes = None
+        if not isinstance(notes, dict):
+            raise ArchiveError(f"damaged: {MANIFEST} of run {hash12} is no JSON object")
+        marked = notes | {TAKEN: printable(archive.replace("\n", " "))}
+        beside[MANIFEST] = json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
+    with run.lock():
+        for name in sorted(name for name in entries if name.startswith(PREFIX)):
+            content = _content(file, entries[name])
+            sha256 = hashlib.sha256(content).hexdigest()
+            if name != PREFIX + sha256 or sha256.encode() not in beside[CONFIG]:
+                what = "does not have the hash that is its name, or its run does not refer to it"
+                raise ArchiveError(f"damaged: {name[:30]}… {what}")
+            if not (run.path / name).exists():
+                (run.path / name).parent.mkdir(exist_ok=True)
+                write_file(run.path / name, content)
+        run.replicates.mkdir(exist_ok=True)
+        files = {run.path / name: content for name, content in beside.items()}
+        write_files({path: content for path, content in files.items() if not path.exists()})
+        run.check()
+        logs = {int(match[2]): e for e in entries.values() if (match := _LOG.fullmatch(e.name))}
+        there, waiting = run.completed(), dict[int, bytes]()
+        for replicate in sorted(logs.keys() - there):
+            waiting[replicate] = content = _content(file, logs[replicate])
+            try:
+                read_summary(content, (run.condition_id, replicate))
+            except CorruptLog as error:
+                name = f"{hash12}, replicate {replicate}"
+                raise ArchiveError(f"damaged: {name}: {error}") from None
+            if sum(map(len, waiting.values())) >= MOST_WAITING:
+                run.write_logs(waiting)
+                waiting = {}
+        run.write_logs(waiting)
+    return TakenRun(run, len(logs.keys() - there), len(logs.keys() & there))
 
 
 def _entries(file: BinaryIO) -> Iterator[tarfile.TarInfo]:
@@ -233,7 +196,7 @@ def _fault(entry: tarfile.TarInfo, names: Collection[str]) -> str:
     """Return why the head of a file, behind others of these names, is not taken; empty: it is."""
     if entry.type not in _PLAIN:
         return f"no regular file, '{printable(entry.name)}' is of kind {entry.type!r}"
-    is_text = entry.name.endswith((CONFIG, MANIFEST, PLANS))
+    is_text = entry.name.endswith(_TEXTS)
     limit = MAX_LOG if entry.name.endswith(".mcap") else MAX_TEXT if is_text else MAX_INPUT
     if not 0 <= entry.size <= limit:
         return "a file is too large"
@@ -245,12 +208,6 @@ def _fault(entry: tarfile.TarInfo, names: Collection[str]) -> str:
     return "too many files" if len(names) >= MOST_FILES else ""
 
 
-def _content(file: BinaryIO, entry: tarfile.TarInfo) -> tuple[bytes, str]:
-    """Return the content of a file of an archive, and its SHA-256, computed as it arrives."""
-    pieces, digest, rest = [], hashlib.sha256(), entry.size
+def _content(file: BinaryIO, entry: tarfile.TarInfo) -> bytes:
     file.seek(entry.offset_data)
-    while rest and (piece := file.read(min(rest, _PIECE))):
-        digest.update(piece)
-        pieces.append(piece)
-        rest -= len(piece)
-    return b"".join(pieces), digest.hexdigest()
+    return file.read(entry.size)  # wholly there

@@ -27,15 +27,9 @@ from evoexp.store.files import (
     warn,
 )
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES
-from evoexp.store.log_reader import (
-    LogContents,
-    checked_summary,
-    demand_place,
-    read_log,
-    read_summary,
-)
+from evoexp.store.log_reader import LogContents, read_log, read_summary
 from evoexp.store.run_directory import RunDirectory, open_run
-from evoexp.store.summaries import altered, damaged_logs, replicate_of, table_damage, whole_logs
+from evoexp.store.summaries import damaged_logs, replicate_of, table_damage, whole_logs
 
 _KNOWN = {CONFIG, MANIFEST, PLANS, REPLICATES, PREFIX.strip("/"), "summary.parquet", ".lock"}
 DELETE = "; delete it, then run again"
@@ -58,12 +52,15 @@ Evaluation = Callable[[Path, LogContents], Iterator[str]]
 
 
 class RunCheck(NamedTuple):
-    """A stored run without its logs."""
+    """A stored run that was looked at."""
 
-    name: str  # of its directory
+    hash: str  # its first twelve digits
     run: RunDirectory | None  # none where nothing in the directory knows its condition
     problems: dict[str, str]  # file → what is wrong with it
     leftovers: list[str]  # files that are no part of a run: temporary, set aside earlier, unknown
+    logs: int = 0  # that were looked at
+    mend: str = ""  # the command that mends it; empty if nothing is wrong or no command does
+    unevaluated: str = ""  # why solutions of logs could not be evaluated; empty if all were
 
 
 def check_run(outputs: Path, name: str) -> RunCheck:
@@ -112,12 +109,11 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
 
     Solutions of a log that is whole are evaluated; `EvoexpError` says that they cannot be.
     """
-    summary, problem, unevaluated = None, "", ""
+    summary, problem, unevaluated, place = None, "", "", (condition_id, int(path.stem))
     try:
-        log = read_log(path)
+        log = read_log(path, place)
         summary = log.summary
         log.arrays()  # each is one
-        demand_place(str(path), (log.condition_id, log.replicate), (condition_id, int(path.stem)))
         problem = next(_contradictions(log), "")
         if not problem:
             try:
@@ -128,16 +124,9 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
         problem = reason(path, error)
     if problem:
         with contextlib.suppress(CorruptLog):
-            checked_summary(path, condition_id, int(path.stem))
+            read_summary(path, place)
             problem += DELETE  # forged: `run` does not see it
     return LogCheck(path.name, problem, summary, unevaluated)
-
-
-def check_rows(run: RunDirectory, logs: list[LogCheck]) -> dict[str, str]:
-    """Return file → problem where rows of the summary table do not repeat their logs."""
-    whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
-    problem = altered(run, whole)
-    return {"summary.parquet": problem + DELETE} if problem else {}
 
 
 def _contradictions(log: LogContents) -> Iterator[str]:

@@ -41,9 +41,16 @@ _TAIL = _FOOTER.size + len(MAGIC)
 class CheckedLog(NamedTuple):
     """A log that is checked."""
 
+    name: str
     reader: SeekingReader  # of mcap, for its messages
-    metadata: list[Metadata]
-    attachments: list[Attachment]
+    records: dict[str, dict[str, str]]  # of metadata, by name
+    attachments: dict[str, bytes]  # by name
+
+    def metadata(self, record: str) -> dict[str, str]:
+        """Return a record of metadata."""
+        if record not in self.records:
+            raise CorruptLog(f"{self.name}: incomplete: no metadata record '{record}'")
+        return self.records[record]
 
 
 @contextmanager
@@ -65,7 +72,7 @@ def check(content: bytes, name: str) -> CheckedLog:
     with unreadable_is_corrupt(name):
         if len(content) - summary_start > MAX_SUMMARY:
             raise ValueError(f"a summary section of more than {MAX_SUMMARY} bytes")
-        log = CheckedLog(SeekingReader(BytesIO(content), validate_crcs=True), [], [])
+        log = CheckedLog(name, SeekingReader(BytesIO(content), validate_crcs=True), {}, {})
         summary: Any = log.reader.get_summary()
         told = [
             [each.chunk_start_offset for each in summary.chunk_indexes],
@@ -139,15 +146,19 @@ def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
             if length > MAX_METADATA:
                 raise ValueError(f"{length} bytes in a record of at most {MAX_METADATA}")
             metadata.append(start)
-            log.metadata.append(Metadata.read(ReadDataStream(BytesIO(view[body:stop]))))
+            record = Metadata.read(ReadDataStream(BytesIO(view[body:stop])))
+            log.records[record.name] = record.metadata
         elif opcode == Opcode.ATTACHMENT:
             attachments.append(start)
-            log.attachments.append(Attachment.read(ReadDataStream(BytesIO(view[body:stop]))))
+            file = Attachment.read(ReadDataStream(BytesIO(view[body:stop])))
+            log.attachments[file.name] = file.data
         elif opcode not in (Opcode.HEADER, Opcode.MESSAGE_INDEX):
             raise ValueError(f"a record of kind {opcode} among the data")
         if len(metadata) + len(attachments) > MAX_ATTACHMENTS:
             raise ValueError(f"more than {MAX_ATTACHMENTS} attachments and records of metadata")
         start = stop
+    if len(log.records) + len(log.attachments) < len(metadata) + len(attachments):
+        raise CorruptLog(f"{log.name}: altered: it holds records of the same name")
     return [chunks, metadata, attachments]
 
 

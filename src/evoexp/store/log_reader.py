@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import orjson
-from mcap.reader import SeekingReader
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
@@ -21,7 +20,7 @@ from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
 from evoexp.store.digests import ContentDigest
-from evoexp.store.log_bounds import MAX_LOG, check, unreadable_is_corrupt
+from evoexp.store.log_bounds import MAX_LOG, CheckedLog, check, unreadable_is_corrupt
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
@@ -34,6 +33,7 @@ from evoexp.store.messages import (
 )
 
 Source = str | PathLike[str] | bytes
+Place = tuple[str, int]  # condition and replicate
 DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}
 _RECORDS: dict[str, type[Any]] = {
     written.GENERATION_TOPIC: GenerationRow,
@@ -67,30 +67,8 @@ class LogContents(NamedTuple):
         }
 
 
-class _OpenLog(NamedTuple):
-    """A log of a run, checked."""
-
-    name: str
-    reader: SeekingReader  # of mcap, for its messages
-    records: dict[str, dict[str, str]]  # of metadata, by name
-    attachments: dict[str, bytes]  # by name
-
-    def metadata(self, record: str) -> dict[str, str]:
-        """Return a record of metadata."""
-        if record not in self.records:
-            raise CorruptLog(f"{self.name}: incomplete: no metadata record '{record}'")
-        return self.records[record]
-
-    def summary(self) -> ReplicateSummary:
-        """Return the summary of the replicate."""
-        summary, run = decode_summary(self.metadata(written.SUMMARY)), self.records[written.RUN]
-        if (summary.condition, summary.replicate) != (run["condition"], int(run["replicate"])):
-            raise CorruptLog(f"{self.name}: altered: its summary is of another replicate")
-        return summary
-
-
 @contextmanager
-def _opened(source: Source) -> Iterator[_OpenLog]:
+def _opened(source: Source) -> Iterator[CheckedLog]:
     """Check a log of a run and open it; a body that cannot be read is a damaged log."""
     name = "log" if isinstance(source, bytes) else str(source)
     try:
@@ -99,27 +77,38 @@ def _opened(source: Source) -> Iterator[_OpenLog]:
         if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
             raise
         raise CorruptLog(f"{name}: cannot be read: {error.strerror or error}") from error
-    checked = check(content, name)
+    log = check(content, name)
     with unreadable_is_corrupt(name):
-        records = {each.name: each.metadata for each in checked.metadata}
-        attachments = {each.name: each.data for each in checked.attachments}
-        if len(records) + len(attachments) < len(checked.metadata) + len(checked.attachments):
-            raise CorruptLog(f"{name}: altered: it holds records of the same name")
-        if written.RUN not in records:
+        if written.RUN not in log.records:
             must = f"an MCAP without metadata record '{written.RUN}'"
             raise CorruptLog(f"{name}: not a log of evoexp: {must}")
-        version = int(records[written.RUN]["schema_version"])
+        version = int(log.records[written.RUN]["schema_version"])
         if version != written.SCHEMA_VERSION:
             age = "a newer" if version > written.SCHEMA_VERSION else "an older"
             raise OtherVersion(
                 f"{name}: written by {age} evoexp: schema version {version}, this one reads "
                 f"{written.SCHEMA_VERSION}"
             )
-        yield _OpenLog(name, checked.reader, records, attachments)
+        yield log
 
 
-def read_log(source: Source) -> LogContents:
-    """Return everything that a log holds, verified; CorruptLog is raised where it is damaged."""
+def _summary(log: CheckedLog, place: Place | None) -> ReplicateSummary:
+    """Return the summary of a log, which must be of its own run, and of a place."""
+    summary, run = decode_summary(log.metadata(written.SUMMARY)), log.records[written.RUN]
+    own = (summary.condition, summary.replicate)
+    if own != (run["condition"], int(run["replicate"])):
+        raise CorruptLog(f"{log.name}: altered: its summary is of another replicate")
+    if place is not None and own != place:
+        theirs = f"replicate {own[1]} of {own[0][:12]}"
+        raise CorruptLog(f"{log.name}: holds {theirs}, which does not belong here")
+    return summary
+
+
+def read_log(source: Source, place: Place | None = None) -> LogContents:
+    """Return everything that a log holds, verified.
+
+    CorruptLog is raised where it is damaged, or does not belong to a place that is given.
+    """
     with _opened(source) as log:
         rows: dict[str, list[Any]] = {topic: [] for topic in _RECORDS}
         digest, cpu_ns = ContentDigest(), list[int]()
@@ -137,7 +126,7 @@ def read_log(source: Source) -> LogContents:
             raise CorruptLog(
                 f"{log.name}: altered: its messages do not give the content digest it carries"
             )
-        run, summary = log.metadata(written.RUN), log.summary()
+        run, summary = log.records[written.RUN], _summary(log, place)
         is_timed = run.get(written.PUBLISHED) == written.CPU_TIME
         return LogContents(
             condition_id=run["condition"],
@@ -154,25 +143,10 @@ def read_log(source: Source) -> LogContents:
         )
 
 
-def read_summary(source: Source) -> ReplicateSummary:
+def read_summary(source: Source, place: Place | None = None) -> ReplicateSummary:
     """Return a log's summary, checked as `read_log` does but for the content digest."""
     with _opened(source) as log:
-        return log.summary()
-
-
-def checked_summary(source: Path | bytes, condition_id: str, replicate: int) -> ReplicateSummary:
-    """Return the summary of a log, or of its bytes, which must be of a condition and replicate."""
-    summary = read_summary(source)
-    name = "log" if isinstance(source, bytes) else str(source)
-    demand_place(name, (summary.condition, summary.replicate), (condition_id, replicate))
-    return summary
-
-
-def demand_place(name: str, own: tuple[str, int], place: tuple[str, int]) -> None:
-    """Raise CorruptLog unless the condition and replicate of a log are those of its place."""
-    if own != place:
-        theirs = f"replicate {own[1]} of {own[0][:12]}"
-        raise CorruptLog(f"{name}: holds {theirs}, which does not belong here")
+        return _summary(log, place)
 
 
 def read_solution(source: Source) -> SolutionRow:

@@ -85,8 +85,8 @@ def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Differen
     Only sections that both have are compared; of two lists, entries that the other lacks are named.
     """
     shared = was.keys() & now.keys() - {"condition"}
-    before = dict(_leaves({name: was[name] for name in shared}))
-    after = dict(_leaves({name: now[name] for name in shared}))
+    before = dict(leaves({name: was[name] for name in shared}))
+    after = dict(leaves({name: now[name] for name in shared}))
     entries = []
     for name in sorted(before.keys() | after.keys()):
         old, new = before.get(name), after.get(name)
@@ -97,12 +97,15 @@ def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Differen
     return entries
 
 
-def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
+def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of plain data by dotted names; lists without mappings are one value."""
+    items = list(tree.items()) if isinstance(tree, Mapping) else []
+    if isinstance(tree, list) and any(isinstance(item, Mapping) for item in tree):
+        items = list(enumerate(tree))
+    for key, value in items:
+        yield from leaves(value, f"{name}.{key}" if name else str(key))
+    if not items:
+        yield name, tree
 
 
 def _git(root: Path, *arguments: str) -> str | None:

@@ -63,21 +63,10 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
 
 def encode_generation(row: GenerationRow) -> bytes:
     """Return the message of one generation; its terms stand in alphabetical order."""
-    values: dict[str, Any] = {
-        "index": int(row.index),
-        "best_cost": float(row.best_cost),
-        "best_cost_in_generation": float(row.best_cost_in_generation),
-        "mean_cost": float(row.mean_cost),
-        "std_cost": float(row.std_cost),
-        "num_feasible": int(row.num_feasible),
-        "evaluations": int(row.evaluations),
-        "collision_queries": int(row.collision_queries),
-        "solved": bool(row.solved),
-    }
-    for name in sorted(row.terms):
-        values[TERM + name] = float(row.terms[name])
-    values["chain"] = row.chain
-    return _encode(values)
+    values = {name: kind(getattr(row, name)) for name, kind in field_types(GenerationRow).items()}
+    chain = values.pop("chain")
+    terms = {TERM + name: float(row.terms[name]) for name in sorted(row.terms)}
+    return _encode({**values, **terms, "chain": chain})
 
 
 def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:

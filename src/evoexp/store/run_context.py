@@ -15,13 +15,13 @@ from typing import Any
 from evoexp.errors import EvoexpError, StoreError
 from evoexp.shipped import rows_of, shipped
 from evoexp.store.identity import CONFIG, MANIFEST, read_object
+from evoexp.store.manifest import leaves
 from evoexp.store.run_directory import RunDirectory
 from evoexp.validation import MOST_QUERIES, TARGET
 
 ORIGIN = ("experiment", "label", "budget")
 LONGEST = 200  # characters of a list
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_NO_SETTING = ("_target_", "revision", "sha256")
 
 
 def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
@@ -100,19 +100,16 @@ def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
     return parts
 
 
-def _settings(config: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+def _settings(config: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield (dotted name, value) of the settings that a column can hold."""
-    for key, value in config.items() if isinstance(config, Mapping) else ():
-        dotted = f"{name}.{key}" if name else str(key)
-        if not _PLAIN.fullmatch(str(key)) or key in _NO_SETTING:
-            continue
-        if isinstance(value, Mapping):
-            if isinstance(value.get("_target_"), str):
-                yield dotted, value["_target_"]
-            yield from _settings(value, dotted)
-        elif isinstance(value, bool | int | float | str):
+    for name, value in leaves(config):
+        group, _, last = name.rpartition(".")
+        dotted = group if last == TARGET else name  # a component is called by its group
+        if isinstance(value, list):
+            value = json.dumps(value)
+            is_short = len(value) <= LONGEST and "{" not in value
+        else:
+            is_short = isinstance(value, bool | int | float | str)
+        is_plain = all(map(_PLAIN.fullmatch, dotted.split(".")))
+        if is_plain and is_short and last not in ("revision", "sha256"):
             yield dotted, value
-        elif isinstance(value, list):
-            text = json.dumps(value)
-            if len(text) <= LONGEST and "{" not in text:
-                yield dotted, text

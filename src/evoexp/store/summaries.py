@@ -7,7 +7,7 @@ import contextlib
 import errno
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import ReplicateSummary, flatten
 from evoexp.store.files import listed, reason, set_aside, warn, write_file
 from evoexp.store.log_bounds import check_sums
-from evoexp.store.log_reader import checked_summary
+from evoexp.store.log_reader import read_summary
 from evoexp.store.messages import field_types
 from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory
@@ -94,14 +94,6 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
     names = [field.name for field in BASE]
     names += sorted(set(table.column_names) - set(names))
     return table.select(names).replace_schema_metadata(None)
-
-
-def summary_rows(
-    run: RunDirectory, names: Sequence[str]
-) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Return some columns of `summary_table` of one run, row by row, and its `damaged_logs`."""
-    summary = _current(run, tell=True)
-    return summary.table.select(list(names)).to_pylist(), summary.damaged
 
 
 def damaged_logs(run: RunDirectory) -> dict[str, str]:
@@ -285,7 +277,7 @@ def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:
     replicate, path, why = replicate_of(name), run.replicates / name, ""
     if _is_log(name):
         try:
-            return flatten(checked_summary(path, run.condition_id, replicate)), ""
+            return flatten(read_summary(path, (run.condition_id, replicate))), ""
         except CorruptLog as error:
             return {}, reason(path, error)
     try:

@@ -17,8 +17,11 @@ A check that fails raises `ContractBroken`, whose message says what a planner or
 operator must do, and what this one did.
 """
 
-from evoexp.testing.contract import CHECKS, Check, check_planner, conditions
-from evoexp.testing.evolution_record import ContractBroken
+import evoexp.testing.contract
+import evoexp.testing.solution_checks  # noqa: F401  # each adds its checks
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.testing.evolution_record import CHECKS, Check, ContractBroken
 from evoexp.testing.operator_checks import check_operator, crossed, mutated, selected
 
 __all__ = [
@@ -32,3 +35,27 @@ __all__ = [
     "mutated",
     "selected",
 ]
+
+
+def conditions(*overrides: str, budget: str = "smoke") -> dict[str, Condition]:
+    """Return the conditions of an experiment by their labels.
+
+    Args:
+        overrides: As on the command line: `experiment=my_experiment`, `ga.num_offspring=4`.
+        budget: Name of the budget; `smoke` takes seconds.
+
+    Raises:
+        EvoexpError: If the experiment cannot be run.
+    """
+    experiments = compose.expand([*overrides, f"budget={budget}"])
+    return {label: condition for each in experiments for label, condition in each.conditions}
+
+
+def check_planner(condition: Condition) -> None:
+    """Check every obligation of a condition's planner, at a small budget.
+
+    Raises:
+        ContractBroken: For the first obligation that the planner does not keep.
+    """
+    for check in CHECKS:
+        check(condition)

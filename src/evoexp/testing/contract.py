@@ -4,61 +4,215 @@ Every check takes a condition, runs its replicate 0 (once for all checks) and ra
 `ContractBroken` where the planner does something else.
 """
 
-from collections.abc import Callable
+import inspect
+import itertools
+import math
+import pickle
+from collections.abc import Iterator
+from typing import get_args
+
+import numpy as np
 
 from evoexp.condition import Condition
-from evoexp.configuration import compose
-from evoexp.testing import protocol_checks as protocol
-from evoexp.testing import record_checks as records
-from evoexp.testing import solution_checks as solutions
+from evoexp.planners.planner import Planner, Reproducibility
+from evoexp.store.log_reader import read_log
+from evoexp.testing.evolution_record import Demand, evolution, finished, obligation
+from evoexp.validation import Component
 
-Check = Callable[[Condition], None]
-
-CHECKS: tuple[Check, ...] = (
-    protocol.every_member_is_there,
-    protocol.a_condition_survives_its_json,
-    protocol.the_same_seed_gives_the_same_bits,
-    protocol.randomness_comes_from_the_given_generator,
-    records.generations_are_numbered,
-    records.evaluations_add_up,
-    records.collision_queries_never_decrease,
-    records.the_best_so_far_never_gets_worse,
-    records.costs_are_those_of_the_generation,
-    records.numbers_are_finite,
-    records.the_summary_says_what_the_log_says,
-    solutions.a_best_solution_is_never_changed,
-    solutions.the_last_population_is_left_alone,
-    solutions.solutions_have_the_documented_shape,
-    solutions.samples_are_judged_alike,
-    solutions.recorded_costs_are_those_of_the_population,
-    solutions.terms_agree_with_evaluate,
-    solutions.a_solved_solution_is_one_of_the_task,
-    solutions.motions_fit_the_robot,
-    solutions.pieces_cover_the_motion,
-    solutions.the_local_operator_leaves_its_argument_alone,
-    solutions.tables_and_remarks_can_be_printed,
-)
+# terms of planners whose best is more than one individual: a team, or a whole plan
+BETTER_THAN_ALONE = {"team_cost", "sub_path", "phase"}
+STARTS_ANEW = "attempts"  # a term of planners that begin again where an attempt has failed
 
 
-def conditions(*overrides: str, budget: str = "smoke") -> dict[str, Condition]:
-    """Return the conditions of an experiment by their labels.
+# its members, its identity, its randomness
 
-    Args:
-        overrides: As on the command line: `experiment=my_experiment`, `ga.num_offspring=4`.
-        budget: Name of the budget; `smoke` takes seconds.
 
-    Raises:
-        EvoexpError: If the experiment cannot be run.
+@obligation
+def every_member_is_there(condition: Condition) -> Iterator[Demand]:
+    """A planner has every member of the protocol `Planner`, with the same parameters."""
+    planner = condition.planner
+    must = "a planner must be a Component, so that a configuration can name it"
+    yield isinstance(planner, Component), must, type(planner).__name__
+    names = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
+    missing = [name for name in names if not hasattr(planner, name)]
+    must = "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
+    yield not missing, f"{must}gives the usual answers)", f"without {', '.join(missing)}"
+    for name in names:
+        wanted = getattr(Planner, name, None)
+        if not inspect.isfunction(wanted):
+            continue
+        method, expected = getattr(planner, name), list(inspect.signature(wanted).parameters)[1:]
+        yield callable(method), f"{name} must be a method", type(method).__name__
+        try:
+            inspect.signature(method).bind(*expected)
+        except TypeError:
+            was = f"{name}{inspect.signature(method)}"
+            yield False, f"{name} must take ({', '.join(expected)})", was
+    choices = {"reproducibility": get_args(Reproducibility), "is_reference": (False, True)}
+    for name, values in choices.items():
+        value = getattr(planner, name)
+        yield value in values, f"{name} must be one of {', '.join(map(repr, values))}", repr(value)
+    number = planner.revision
+    is_number = type(number) is int and number > 0
+    yield is_number, "revision must be a whole number, at least 1", number
+
+
+@obligation
+def a_condition_survives_its_json(condition: Condition) -> Iterator[Demand]:
+    """A condition read back from its canonical form, or unpickled, is the same with one hash."""
+    forms = {
+        "from its JSON": Condition.from_json(condition.to_json()),
+        "from a pickle": pickle.loads(pickle.dumps(condition)),
+    }
+    for how, again in forms.items():
+        must = f"a condition read back {how} must be equal and have the same hash"
+        yield again == condition and again.id == condition.id, must, again.id[:12]
+
+
+@obligation
+def the_same_seed_gives_the_same_bits(condition: Condition) -> Iterator[Demand]:
+    """A replicate run twice has one digest; another replicate has another one."""
+    first, other = (finished(condition, k).summary.digest for k in range(2))
+    again = finished.__wrapped__(condition, 0).summary.digest
+    must = "two runs of one replicate must agree in every bit (keep nothing from run to run)"
+    yield first == again, must, f"{first} and {again}"
+    must = "another replicate must use its own random numbers and so give other bits"
+    yield other != first, must, f"one digest, {first}"
+
+
+@obligation
+def randomness_comes_from_the_given_generator(condition: Condition) -> Iterator[Demand]:
+    """Only `rng` is drawn from, only while the planner evolves, and never kept."""
+    found = evolution(condition)
+    must = "random numbers must come from rng, never from a global generator"
+    yield not found.global_randomness, must, "another state of it"
+    must = "evolve must draw its random numbers from rng"
+    has_drawn = found.has_drawn or condition.is_reference
+    yield has_drawn, must, "a generator that nobody drew from"
+    rng = condition.rng(0)
+    evolution_of_two = found.planner.evolve(found.problem, rng)
+    next(evolution_of_two)
+    state = rng.bit_generator.state
+    for call in (found.planner.motion, found.planner.evaluate):
+        call(found.problem, np.array(found.last.best))
+    must = "motion and evaluate must not draw from a generator that evolve was given"
+    yield rng.bit_generator.state == state, must, "another state of it"
+    evolution_of_two.close()
+
+
+# its records: counts, costs, finite numbers
+
+
+@obligation
+def generations_are_numbered(condition: Condition) -> Iterator[Demand]:
+    """Generations count from 0 without a gap, and are no more than announced."""
+    found = evolution(condition)
+    indices = [generation.index for generation in found.generations]
+    must = "generations must be numbered 0, 1, 2, …, the initial population being 0"
+    yield indices == list(range(len(indices))), must, indices
+    announced = found.planner.num_generations
+    must = f"generations after the initial one must be at most num_generations ({announced})"
+    yield STARTS_ANEW in found.last.terms or indices[-1] <= announced, must, indices[-1]
+
+
+@obligation
+def evaluations_add_up(condition: Condition) -> Iterator[Demand]:
+    """Evaluations grow by what `num_evaluations` announces for each generation.
+
+    The last generation may have fewer where the planner ends by itself.
     """
-    experiments = compose.expand([*overrides, f"budget={budget}"])
-    return {label: condition for each in experiments for label, condition in each.conditions}
+    found = evolution(condition)
+    counts = [generation.evaluations for generation in found.generations]
+    grow = all(a < b for a, b in itertools.pairwise([0, *counts]))
+    yield grow, "evaluations must grow with every generation", counts
+    if condition.is_reference or STARTS_ANEW in found.last.terms:
+        return
+    costs = found.generations[0].costs  # of several populations at once, there is a row for each
+    rows = len(costs) if costs.ndim > 1 else 1
+    announced = itertools.accumulate(map(found.planner.num_evaluations, range(len(counts))))
+    for index, (count, was) in enumerate(zip(announced, counts, strict=True)):
+        wanted, ends = rows * count, bool(found.generations[index].stop_reason)
+        must = f"evaluations up to generation {index} must be the sum of num_evaluations, {wanted}"
+        yield was == wanted or (ends and was < wanted), must, was
 
 
-def check_planner(condition: Condition) -> None:
-    """Check every obligation of a condition's planner, at a small budget.
+@obligation
+def collision_queries_never_decrease(condition: Condition) -> Iterator[Demand]:
+    """Collision queries are counted since the start."""
+    counts = [generation.collision_queries for generation in evolution(condition).generations]
+    must = "collision_queries are counted since the start: they must never decrease"
+    yield all(a <= b for a, b in itertools.pairwise([0, *counts])), must, counts
 
-    Raises:
-        ContractBroken: For the first obligation that the planner does not keep.
-    """
-    for check in CHECKS:
-        check(condition)
+
+@obligation
+def the_best_so_far_never_gets_worse(condition: Condition) -> Iterator[Demand]:
+    """The best cost is the least of all generations so far, or the least that was proven."""
+    found = evolution(condition)
+    costs = [generation.best_cost for generation in found.generations]
+    least = np.minimum.accumulate([each.best_cost_in_generation for each in found.generations])
+    if getattr(found.planner, "answers_are_proven", False):  # and cheaper ones may be refuted
+        must = "best_cost must never get worse, and be no less than the least cost so far"
+        never_worse = all(a >= b for a, b in itertools.pairwise(costs))
+        yield never_worse and bool(np.all(costs >= least)), must, costs
+        return
+    for index, (cost, lowest) in enumerate(zip(costs, least.tolist(), strict=True)):
+        must = f"best_cost must be the least cost so far ({lowest!r} in generation {index})"
+        yield cost == lowest, must, repr(cost)
+
+
+@obligation
+def costs_are_those_of_the_generation(condition: Condition) -> Iterator[Demand]:
+    """Least and mean cost and the number of feasible individuals agree with the costs."""
+    for generation in evolution(condition).generations:
+        costs, where = generation.costs, f" in generation {generation.index}"
+        must = f"num_feasible must lie between 0 and the number of costs, {costs.size},{where}"
+        yield 0 <= generation.num_feasible <= costs.size, must, generation.num_feasible
+        if costs.ndim != 1:  # the best is a team of several populations
+            continue
+        least = generation.best_cost_in_generation
+        must = f"best_cost_in_generation must be the least of costs, {costs.min()!r},{where}"
+        yield least == costs.min(), must, repr(least)
+        if BETTER_THAN_ALONE & generation.terms.keys():
+            continue
+        finite = costs[np.isfinite(costs)]
+        wanted = (finite.mean(), finite.std()) if finite.size else (np.nan, np.nan)
+        was = (generation.mean_cost, generation.std_cost)
+        size = float(np.abs(finite).max()) if finite.size else 0.0
+        fits = np.allclose(was, wanted, rtol=1e-9, atol=1e-9 * size, equal_nan=True)
+        must = f"mean_cost and std_cost must be those of the finite costs, {wanted},{where}"
+        yield fits, must, was
+
+
+@obligation
+def numbers_are_finite(condition: Condition) -> Iterator[Demand]:
+    """Solutions, populations and terms are finite; costs are numbers or inf, never NaN."""
+    for generation in evolution(condition).generations:
+        where = f" in generation {generation.index}"
+        for name, values in (("best", generation.best), ("population", generation.population)):
+            must = f"{name} must hold finite numbers{where}"
+            yield np.all(np.isfinite(values)), must, "inf or NaN"
+        must = f"costs must be numbers, or inf where an individual is infeasible{where}"
+        yield not np.isnan(generation.costs).any(), must, "NaN"
+        solved, terms = generation.solved, generation.terms
+        yield type(solved) is bool, f"solved must be true or false{where}", repr(solved)
+        wrong = {k: v for k, v in terms.items() if not isinstance(v, int | float)}
+        yield not wrong, f"terms must be numbers by name{where}", wrong
+
+
+@obligation
+def the_summary_says_what_the_log_says(condition: Condition) -> Iterator[Demand]:
+    """The summary of a replicate has the numbers of its last generation."""
+    log = read_log(finished(condition, 0).content)
+    last, summary = log.generations[-1], log.summary
+    for name in ("best_cost", "evaluations", "collision_queries", "solved"):
+        was, wanted = getattr(summary, name), getattr(last, name)
+        must = f"{name} of the summary must be that of the last generation, {wanted}"
+        yield was == wanted, must, was
+    found = evolution(condition)  # which no cap on collision queries ends
+    evaluated = found.planner.evaluate(found.problem, np.array(log.solutions[-1].values))
+    must = "terms of the summary must be those that are recorded and those of evaluate"
+    given, wanted = (sorted(terms.items()) for terms in (summary.terms, last.terms | evaluated))
+    yield repr(given) == repr(wanted), must, summary.terms  # NaN equals NaN
+    must = f"the last logged solution must have the best cost, {last.best_cost}"
+    same = log.solutions[-1].cost == last.best_cost or math.isnan(last.best_cost)
+    yield same, must, log.solutions[-1].cost

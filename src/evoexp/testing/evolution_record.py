@@ -1,7 +1,8 @@
-"""One evolution of a planner, generation by generation, with copies of all that it showed."""
+"""One evolution of a planner, with copies of all that it showed, and what is demanded of it."""
 
 import functools
 import random
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,11 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.records import FloatArray, Generation, generations
 from evoexp.store.log import Finished
+
+Check = Callable[[Condition], None]
+Demand = tuple[object, str, object]  # whether an obligation is kept, what it is, what was instead
+
+CHECKS: list[Check] = []
 
 
 class ContractBroken(AssertionError):
@@ -48,8 +54,8 @@ def evolution(condition: Condition) -> EvolutionRecord:
         bests.append(each.best)
         best, costs, copied = each.best.copy(), each.costs.copy(), population.copy()
         records.append(each._replace(best=best, costs=costs, population=copied))
-    must = "evolve must yield the initial population at least"
-    demand(records, condition, must, "nothing")
+    if not records:
+        raise ContractBroken("evolve must yield the initial population at least; was nothing")
     has_drawn, used = rng.bit_generator.state != untouched, before != _global_states()
     return EvolutionRecord(planner, problem, records, bests, population, has_drawn, used)
 
@@ -60,11 +66,18 @@ def finished(condition: Condition, replicate: int) -> Finished:
     return run_replicate(condition, replicate)
 
 
-def demand(holds: object, condition: Condition, obligation: str, was: object) -> None:
-    """Raise `ContractBroken` unless a planner keeps an obligation."""
-    if not holds:
-        name = getattr(condition.planner, "component", type(condition.planner).__name__)
-        raise ContractBroken(f"planner '{name}': {obligation}; was {was}")
+def obligation(demands: Callable[[Condition], Iterator[Demand]]) -> Check:
+    """Make a check of what a function demands of a condition's planner."""
+
+    @functools.wraps(demands)
+    def check(condition: Condition) -> None:
+        for is_kept, must, was in demands(condition):
+            if not is_kept:
+                name = getattr(condition.planner, "component", type(condition.planner).__name__)
+                raise ContractBroken(f"planner '{name}': {must}; was {was}")
+
+    CHECKS.append(check)
+    return check
 
 
 def _global_states() -> tuple[Any, ...]:

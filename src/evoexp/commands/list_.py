@@ -35,8 +35,9 @@ def main(arguments: argparse.Namespace) -> int:
                     reason = str(run.failure(replicate)["reason"])
                 except EvoexpError as error:
                     reason = str(error)
-                path = run.failure_path(replicate)
-                say(f"{run.hash12} #{replicate}: {printable(reason)} ({path})")
+                say(
+                    f"{run.hash12} #{replicate}: {printable(reason)} ({run.failure_path(replicate)})"
+                )
         say(f"{count or 'no'} failed replicates in {outputs_root()}")
         return 0
     files = [find("experiment", name) for name in options("experiment")]

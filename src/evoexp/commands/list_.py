@@ -17,6 +17,7 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
+FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
 RUN_KEYS = (
     *("hash", *ORIGIN, "changed", "planned", "done", "failed", "solved", "certified"),
     *("median_best_cost", "median_cpu_s", "damage"),
@@ -26,34 +27,49 @@ RUN_KEYS = (
 def main(arguments: argparse.Namespace) -> int:
     """Print both lists, or that of failures."""
     if arguments.failed:
-        count = 0
-        runs = [run for _, run in stored_runs(outputs_root()) if isinstance(run, RunDirectory)]
-        for run in runs:
-            for replicate in sorted(run.failed()):
-                count += 1
-                try:
-                    reason = str(run.failure(replicate)["reason"])
-                except EvoexpError as error:
-                    reason = str(error)
-                say(
-                    f"{run.hash12} #{replicate}: {printable(reason)} ({run.failure_path(replicate)})"
-                )
-        say(f"{count or 'no'} failed replicates in {outputs_root()}")
+        failures = _failures()
+        if arguments.json:
+            print_json(failures)
+        elif failures:
+            table = new_table("", hash_column(), "condition", *right("#"), "reason")
+            for each in failures:
+                label, reason = coloured(each["label"]), coloured(each["reason"])
+                table.add_row(each["hash"], label, str(each["replicate"]), reason)
+            say(table)
+        else:
+            say(f"no failed replicates in {outputs_root()}")
         return 0
     files = [find("experiment", name) for name in options("experiment")]
     rows = ((each.name, description(each.name), each.origin, each.path) for each in files)
     experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in rows]
-    entries = [run_row(name, run) for name, run in stored_runs(outputs_root())]
+    runs = [run_row(name, run) for name, run in stored_runs(outputs_root())]
     if arguments.json:
-        print_json({"experiments": experiments, "runs": entries})
+        print_json({"experiments": experiments, "runs": runs})
         return 0
     table = new_table("experiments", "run experiment=", "description", "from")
     for each in experiments:
         table.add_row(each["name"], each["description"], each["origin"])
     say(table)
     title = f"runs stored in {outputs_root()}"
-    say(run_table(title, entries) if entries else f"no runs stored in {outputs_root()}")
+    say(run_table(title, runs) if runs else f"no runs stored in {outputs_root()}")
     return 0
+
+
+def _failures() -> list[dict[str, Any]]:
+    """Return the failed replicates, run by run."""
+    rows = []
+    for name, run in stored_runs(outputs_root()):
+        if isinstance(run, EvoexpError) or not run.failed():
+            continue
+        label = origin_of(run)["label"] or ""
+        for replicate in sorted(run.failed()):
+            try:
+                reason = str(run.failure(replicate)["reason"])
+            except EvoexpError as error:
+                reason = str(error)
+            row = (name, label, replicate, reason, str(run.failure_path(replicate)))
+            rows.append(dict(zip(FAILED_KEYS, row, strict=True)))
+    return rows
 
 
 def run_row(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:

@@ -48,6 +48,21 @@ def test_the_setting_precedes_folders_above_which_precede_the_environment(
     assert sought(file, {"hand": tmp_path / "hand-1.0"}) == b"setting"
 
 
+def test_packages_of_a_workspace_go_by_the_names_in_their_manifests(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "lab" / "arm.urdf"
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
+    for name, folder in (("other", "hand_of_others"), (" hand ", "hand_description")):
+        with pytest.raises(SettingError):
+            sought(file, {})
+        package = mesh(tmp_path / "src" / "hands" / folder, "workspace")
+        (package / "package.xml").write_text(f"<package>\n<name>{name}</name></package>")
+    assert sought(file, {}) == b"workspace"
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(package))
+    assert sought(file, {}) == b"workspace"
+
+
 def test_the_message_lists_the_places_that_were_tried(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

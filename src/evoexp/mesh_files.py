@@ -1,6 +1,8 @@
 """Meshes that a URDF or a planning scene names: beside it, or in a package of meshes."""
 
+import contextlib
 import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,8 @@ from evoexp.input_files import read_bounded
 MESHES = (".stl", ".obj", ".dae", ".ply")  # endings: nobody's other files travel with a log
 PACKAGE = "package://"
 PATHS = "ROS_PACKAGE_PATH"  # folders in which ROS looks for packages
+MANIFEST = "package.xml"  # lies in the folder of a package
+DEEPEST = 4  # folders of a workspace, one in another, in which packages are looked for
 MOST_PLACES = 4000  # characters of a message
 
 
@@ -34,7 +38,7 @@ def mesh_content(name: str, file: Path, packages: Mapping[str, Path], field: str
     """Read a mesh by the name that a file gives it.
 
     `package://NAME/REST` lies in the folder that `packages` tells for NAME; else in a directory
-    above the file, with or without NAME; else in a folder of `ROS_PACKAGE_PATH`. Any other
+    above the file, with or without NAME; else in a package below `ROS_PACKAGE_PATH`. Any other
     name is a path, from the directory of the file.
     """
     tried: list[Path] = []
@@ -77,4 +81,20 @@ def _places(name: str, file: Path, packages: Mapping[str, Path], field: str) -> 
     yield from (folder / path for folder in above)
     yield from (folder / rest for folder in above)
     for text in filter(None, os.environ.get(PATHS, "").split(os.pathsep)):
-        yield Path(text) / path
+        folder = Path(text)
+        yield folder / path
+        yield from (found / rest for found in _workspace_folders(folder, package))
+
+
+def _workspace_folders(folder: Path, package: str) -> Iterator[Path]:
+    """Yield the folders, in and below one, whose manifest gives them the name of a package."""
+    for place, folders, files in os.walk(folder):
+        here, name = Path(place), None
+        with contextlib.suppress(OSError):
+            if MANIFEST in files:
+                name = re.search(rb"<name>\s*([^<\s]+)\s*</name>", read_bounded(here / MANIFEST))
+        if name is not None and name[1].decode(errors="replace") == package:
+            yield here
+        if MANIFEST in files or len(here.relative_to(folder).parts) >= DEEPEST:
+            folders.clear()  # packages do not contain packages
+        folders.sort()

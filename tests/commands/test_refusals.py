@@ -48,7 +48,7 @@ OVERRIDES = {
     # what a configuration may not name
     "ga._target_=os.system": "ga._target_: must be a registered component, was 'os.system'",
     "+ga.x={_target_:builtins.eval}": "must be a registered component, was 'builtins.eval'",
-    "hydra.run.dir=/tmp/x": "(nothing of Hydra's own; evoexp show experiment=NAME has all), was",
+    "hydra.run.dir=/tmp/x": "(nothing of Hydra's own; EVOEXP_OUTPUTS names the folder), was 'hydra",
     "hydra/launcher=basic": "nothing of Hydra's own",
     "conditions={}": "must be left to the experiment's file (choose among them: --only LABEL)",
     "budget.name=paper": "budget.name: must be left as it is: claims are judged by it",
@@ -80,6 +80,7 @@ COMMANDS = {
     "run experiment=": "experiment: no option '' (options: ",
     "run experiment=null": f"experiment: {CHOSEN} (without one, every group is",
     "run robot=two_planar_2r": f"experiment: {CHOSEN}",
+    "run --cfg job": "no option '--cfg': evoexp show experiment=NAME; with --all",
     "run experiment=rana_planar,rana_obstacles": "experiment: must be one value (or add -m",
     "run -m experiment=rana_planar scenario.length_unit=choice(a',m)": "must be a number, a word, ",
     "run experiment=rana_planar --only GA": "--only: no option 'GA'",

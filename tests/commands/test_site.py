@@ -143,11 +143,12 @@ def test_a_report_that_names_no_command_is_left_as_it_is(stored: Path, evoexp: E
 
 
 @pytest.mark.usefixtures("drawn")
-def test_a_run_that_is_not_complete_is_partial(
-    run: RunDirectory, stored: Path, evoexp: Evoexp
-) -> None:
+def test_a_sweep_that_runs_is_told(run: RunDirectory, stored: Path, evoexp: Evoexp) -> None:
     run.note_plan(9)
-    evoexp("site")
+    assert "being written now" not in evoexp("site").out
+    with RunDirectory(stored, run.condition_id).lock():
+        said = evoexp("site")
+    assert f"1 run is being written now ({run.hash12})" in said.out
     home = Page((stored / "reports" / "index.html").read_bytes())
     states = {row[0]: row[7] for row in home.tables()[0][1:]}
     assert states[run.hash12] == "partial"

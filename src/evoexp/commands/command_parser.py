@@ -22,6 +22,21 @@ COMMANDS: dict[str, str] = {name: command["summary"] for name, command in _DECLA
 MODULES = {"list": "list_", "claims": "claim_list"}  # where a module has another name
 
 
+HYDRAS_OPTIONS = {
+    "--cfg": "evoexp show experiment=NAME; with --all every setting",
+    "--info": "evoexp show experiment=NAME; evoexp list",
+    "--resolve": "evoexp show --all experiment=NAME",
+    "--package": "evoexp show --all experiment=NAME",
+    "--run": "evoexp run experiment=NAME",
+    "--config-name": "evoexp run experiment=NAME",
+    "--config-path": "--config-dir DIR",
+    "--experimental-rerun": "evoexp reproduce HASH",
+    "--shell-completion": "evoexp completion bash",
+    "--hydra-help": "evoexp run --help",
+}
+"""Option of a Hydra application → evoexp's own way."""
+
+
 class CommandParser(argparse.ArgumentParser):
     """Parser that names the wrong word in one line."""
 
@@ -43,7 +58,9 @@ class CommandParser(argparse.ArgumentParser):
             word = next((word for word in words if word.startswith("-")), words[0])
             lines = re.findall(r"^  (-.+?)(?:  |$)", self.format_help(), re.MULTILINE)
             known = re.findall(r"(?<![\w-])--?[a-z][\w-]*", "\n".join(lines))
+            instead = HYDRAS_OPTIONS.get(word.partition("=")[0])
             message = f"no option '{word}'{nearest(word, known)} (options: {', '.join(known)})"
+            message = f"no option '{word}': {instead}" if instead else message
         self.exit(2, f"evoexp: {message}\n")
 
 

@@ -15,7 +15,9 @@ from evoexp.report.pages.html_page import HTML
 from evoexp.report.statistics.claim_rules import registered_rules
 from evoexp.store.files import write_file
 from evoexp.store.run_context import ORIGIN, origin_of
-from evoexp.store.run_directory import outputs_root
+from evoexp.store.run_directory import RunDirectory, outputs_root
+
+MAX_NAMED = 4  # runs that are named as being written
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -30,6 +32,21 @@ def write_site() -> None:
     directory.mkdir(parents=True, exist_ok=True)
     write_file(directory / HTML, files[HTML])
     say(f"site: {directory / HTML}")
+    # unfinished runs that another process is writing now
+    busy = [
+        name
+        for name, run in stored_runs(outputs_root())
+        if isinstance(run, RunDirectory)
+        and run.num_planned() > len(run.completed())
+        and run.is_being_written()
+    ]
+    if busy:
+        more = ", …" if len(busy) > MAX_NAMED else ""
+        which = "runs are" if len(busy) > 1 else "run is"
+        say(
+            f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
+            "their results are partial"
+        )
 
 
 def home_files() -> ReportFiles:

@@ -15,6 +15,15 @@ AROUND = ("control", "reference")  # groups whose option is put around the chose
 OPTIONAL = (EXPERIMENT, *AROUND, *PLANNER_PARTS)  # groups that a configuration may do without
 NOT_IDENTITY = (EXPERIMENT, "budget", "num_replicates", "runner", "report")
 SCALARS = ("seed", "num_replicates")  # settings outside the groups
+HYDRAS_OWN = {
+    "launcher": "runner=serial, loky or dask",
+    "sweeper": "evoexp run -m sweeps",
+    "run": "EVOEXP_OUTPUTS names the folder",
+    "sweep": "EVOEXP_OUTPUTS names the folder",
+    "job_logging": "results go to outputs, nothing else is logged",
+    "searchpath": "--config-dir DIR",
+}
+"""Part of Hydra's own configuration → what evoexp has instead."""
 
 
 class Value(NamedTuple):
@@ -84,7 +93,9 @@ def _check_setting(override: Override) -> None:
     """Refuse keys that are no setting of evoexp, or that no override may change."""
     key, text, roots = override.key, override.text, [*groups(), *SCALARS]
     if override.root == "hydra":
-        must = "a setting of evoexp (nothing of Hydra's own; evoexp show experiment=NAME has all)"
+        part = next(iter(re.findall(r"hydra[./](\w+)", key)), "")
+        instead = HYDRAS_OWN.get(part, "evoexp show experiment=NAME prints what there is")
+        must = f"a setting of evoexp (nothing of Hydra's own; {instead})"
         raise SettingError("override", must, text)
     if "/" in key:
         raise SettingError("override", "key=value", text)

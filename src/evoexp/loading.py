@@ -28,6 +28,29 @@ class Frames(NamedTuple):
     # `summary.parquet`
     summaries: pd.DataFrame
 
+    def __repr__(self) -> str:
+        """Return the conditions and the size of each frame."""
+        keys = self.summaries[["label", "condition"]].value_counts(sort=False).reset_index()
+        rows = [
+            f"  {label}  {key[:12]}  {count} replicates"
+            for label, key, count in keys.itertuples(index=False)
+        ]
+        sizes = [
+            f"{name}: {len(frame)} rows × {len(frame.columns)} columns"
+            for name, frame in self._asdict().items()
+        ]
+        return "\n".join([", ".join(sizes), *rows])
+
+    def _repr_html_(self) -> str:
+        """Return the conditions with medians, for a notebook."""
+        groups = self.summaries.groupby(["label", "condition"], sort=False)
+        table = groups.agg(
+            replicates=("replicate", "size"),
+            solved=("solved", "sum"),
+            median_best_cost=("best_cost", "median"),
+        ).reset_index()
+        return str(table.assign(condition=table["condition"].str[:12]).to_html(index=False))
+
 
 def load(
     what: str,

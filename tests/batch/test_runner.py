@@ -14,9 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evoexp.batch.warm_kernels as warm_kernels_module
-from evoexp.batch import jobs
+from evoexp.batch import jobs, live_curves
 from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
+from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
@@ -116,6 +117,18 @@ def test_a_condition_is_built_once_per_process(
     assert len(calls) == 1
     again = run_replicate(own, 2).content
     assert read_log(outcomes[2].content).content_digest == read_log(again).content_digest
+
+
+def test_a_batch_tells_how_its_replicates_converge(
+    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
+    (tmp_path / "curves").mkdir()
+    run(tmp_path / "outputs", (faulty, 1), curves=tmp_path / "curves")
+    (curve,) = read_curves(tmp_path / "curves")
+    log = read_log(RunDirectory(tmp_path / "outputs", faulty.id).log_path(0))
+    assert curve[:3] == (faulty.id, 0, log.summary.num_generations)
+    assert curve.costs[-1] == log.summary.best_cost
 
 
 def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
@@ -18,6 +19,7 @@ def fan_out(
     jobs: Sequence[Job],
     workers: Workers | None,
     limits: ReplicateLimits = NO_LIMITS,
+    curves: Path | None = None,
 ) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes, or in this one; yield outcomes as they come.
 
@@ -27,10 +29,10 @@ def fan_out(
     """
     if workers is None:
         for job in jobs:
-            outcomes = run_jobs([job], limits)
+            outcomes = run_jobs([job], limits, curves=curves)
             yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
-    run = partial(run_jobs, limits=limits, in_worker=True)
+    run = partial(run_jobs, limits=limits, in_worker=True, curves=curves)
     replicates = Replicates(jobs, workers.number, limits)
     yield from workers.results(run, replicates.next_task, replicates.end_task)
 

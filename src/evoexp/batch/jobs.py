@@ -4,9 +4,11 @@ import functools
 import time
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.attachments import keep_all
+from evoexp.batch.live_curves import CurveFile
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
@@ -48,10 +50,12 @@ def run_jobs(
     limits: ReplicateLimits = NO_LIMITS,
     *,
     in_worker: bool = False,
+    curves: Path | None = None,
 ) -> list[Outcome]:
     """Run replicates in this process, one after the other; a failure is an outcome.
 
-    One at least is run; no further one begins after `LONGEST_TASK_S`.
+    One at least is run; no further one begins after `LONGEST_TASK_S`. Convergence is told in the
+    folder `curves`, if there is one.
     """
     from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
 
@@ -66,7 +70,8 @@ def run_jobs(
             condition = condition_of(job)
             condition.prepare()
             with limited(limits, in_worker=in_worker):
-                content, summary = run_replicate(condition, job.replicate, job.condition_json)
+                hear = None if curves is None else CurveFile(curves, *job.key).hear
+                content, summary = run_replicate(condition, job.replicate, job.condition_json, hear)
         except Exception as error:
             trace = traceback.format_exc()
             is_late = isinstance(error, TookTooLong)

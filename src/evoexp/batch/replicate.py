@@ -2,6 +2,7 @@
 
 import hashlib
 import time
+from collections.abc import Callable
 from typing import Any
 
 from evoexp.attachments import SHA256
@@ -20,13 +21,19 @@ EXACT_BOXES = "exact_boxes"  # the entry of a log's environment; logs without it
 HASHED = f'"{SHA256}"'.encode()  # stands in configurations that refer to files, and only there
 
 
-def run_replicate(condition: Condition, index: int, config_json: bytes | None = None) -> Finished:
+def run_replicate(
+    condition: Condition,
+    index: int,
+    config_json: bytes | None = None,
+    hear: Callable[[Block], None] | None = None,
+) -> Finished:
     """Run one seeded replicate; return its finished log as bytes and its summary row.
 
     SettingError is raised where the budget does not suffice for the first generation.
 
     Args:
         config_json: The condition's canonical form, which takes as long as a short run to make.
+        hear: Told every block of generations, after the log was.
     """
     config_json = config_json or condition.to_json()
     planner, problem = condition.prepare()  # kept: no part of a replicate's time
@@ -43,6 +50,8 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
         if within.num_generations > 0:
             log.write(within, time.process_time() - begun_cpu_s)
             last = within
+            if hear is not None:
+                hear(within)
             if first_feasible is None:
                 counts = enumerate(within.num_feasible, within.first)
                 first_feasible = next((k for k, count in counts if count > 0), None)

@@ -39,6 +39,7 @@ class Batch:
         outputs: Path,
         *,
         retry_failed: bool = False,
+        curves: Path | None = None,
     ) -> None:
         """Plan; nothing is written yet but summary tables that were out of date.
 
@@ -46,7 +47,9 @@ class Batch:
             conditions: (condition, number of replicates, notes for the manifest of a new run); one
                 may occur twice.
             retry_failed: Whether replicates that failed before run again.
+            curves: Folder for the convergence of running replicates; None: it is not told.
         """
+        self._curves = curves
         self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
@@ -130,7 +133,7 @@ class Batch:
             return cluster_fan_out(self.jobs, self._settings, limits)
         from evoexp.batch.fan_out import fan_out
 
-        return fan_out(self.jobs, workers, limits)
+        return fan_out(self.jobs, workers, limits, self._curves)
 
     @property
     def num_workers(self) -> int:

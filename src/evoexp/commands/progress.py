@@ -2,10 +2,11 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -16,11 +17,30 @@ from rich.progress import (
 )
 
 from evoexp.batch.jobs import Outcome
+from evoexp.batch.live_curves import Curve, read_curves
 
 PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
 MOST_ROWS = 12  # conditions on the screen: those that a replicate ended of last
 MINUTES_FROM_S = 100.0  # [s] from which the rest is told in minutes
 SPEED_OVER_S = 3600.0  # [s] of the past from which the rest is estimated
+CURVE_WIDTH = 16  # characters of a curve
+LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
+UNSOLVED = "x"
+LIVE_NOTE = (
+    "convergence: best cost so far of the replicate heard last, from its first generation to the "
+    f"one shown, each between its own extremes; {UNSOLVED}: nothing solved yet"
+)
+
+
+class _Bars(Progress):
+    """Bars that look for news before they are drawn."""
+
+    look: Callable[[], None] = staticmethod(lambda: None)
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """Return the bars, with the latest news."""
+        self.look()
+        return super().get_renderables()
 
 
 class BatchProgress:
@@ -30,11 +50,18 @@ class BatchProgress:
         self,
         console: Console,
         wanted: Mapping[str, tuple[str, int]],
+        curves: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Prepare rows, by condition's id → its label, and its replicates to run."""
+        """Prepare; shown inside `shown`.
+
+        Args:
+            wanted: Condition's id → its label, and its replicates to run.
+            curves: Folder in which workers leave the convergence of what they run; None: not shown.
+        """
         texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
-        self._bars = Progress(
+        texts += ["{task.fields[curve]}"] if curves is not None else []
+        self._bars = _Bars(
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=10),
             MofNCompleteColumn(),
@@ -44,16 +71,18 @@ class BatchProgress:
             get_time=clock,
             speed_estimate_period=SPEED_OVER_S,
         )
-        self._console, self._clock = console, clock
+        self._bars.look = self._read_curves
+        self._console, self._curves, self._clock = console, curves, clock
         self._tasks = {key: self._row(*each, visible=False) for key, each in wanted.items()}
         self._all = self._row("replicates", sum(total for _, total in wanted.values()))
         self._best = dict.fromkeys(wanted, np.inf)
         self._failed = dict.fromkeys(wanted, 0)
+        self._known: dict[str, Curve] = {}
         self._last_shown: dict[str, None] = {}  # conditions on the screen, the newest last
         self._last_line = clock()
 
     def _row(self, label: str, total: int, *, visible: bool = True) -> TaskID:
-        return self._bars.add_task(label, total=total, visible=visible, failed=0, best="")
+        return self._bars.add_task(label, total=total, visible=visible, failed=0, best="", curve="")
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
@@ -65,6 +94,8 @@ class BatchProgress:
                 if self._bars.tasks[-1].completed:
                     self._say()
             return
+        if self._curves is not None:
+            self._console.print(LIVE_NOTE)
         try:
             with self._bars:
                 yield
@@ -78,21 +109,34 @@ class BatchProgress:
         if outcome.summary is not None:
             self._best[key] = min(self._best[key], outcome.summary.best_cost)
         best = f"best {self._best[key]:.4g}" if np.isfinite(self._best[key]) else ""
-        # the condition that nothing was heard of for the longest time makes room
-        self._last_shown.pop(key, None)
-        self._last_shown[key] = None
-        if len(self._last_shown) > MOST_ROWS:
-            oldest = next(iter(self._last_shown))
-            del self._last_shown[oldest]
-            self._bars.update(self._tasks[oldest], visible=False)
-        self._bars.update(
-            self._tasks[key], advance=1, visible=True, failed=self._failed[key], best=best
-        )
+        self._show_row(key)
+        self._bars.update(self._tasks[key], advance=1, failed=self._failed[key], best=best)
         self._bars.update(self._all, advance=1, failed=sum(self._failed.values()))
         now = self._clock()
         if not self._console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
             self._last_line = now
             self._say()
+
+    def _show_row(self, key: str) -> None:
+        """Show a condition; the one that nothing was heard of for the longest time makes room."""
+        self._last_shown.pop(key, None)
+        self._last_shown[key] = None
+        self._bars.update(self._tasks[key], visible=True)
+        if len(self._last_shown) > MOST_ROWS:
+            oldest = next(iter(self._last_shown))
+            del self._last_shown[oldest]
+            self._bars.update(self._tasks[oldest], visible=False)
+
+    def _read_curves(self) -> None:
+        """Draw the curves that the workers left."""
+        levels = LEVELS if self._console.encoding.startswith("utf") else PLAIN_LEVELS
+        for curve in [] if self._curves is None else read_curves(self._curves):
+            key = curve.condition_id
+            if key in self._tasks and self._known.get(key) != curve:
+                self._known[key] = curve
+                self._show_row(key)
+                text = f"{curve.generation} {drawn(curve.costs, levels)}"
+                self._bars.update(self._tasks[key], curve=text)
 
     def _say(self) -> None:
         total, failed = self._bars.tasks[-1], sum(self._failed.values())
@@ -102,3 +146,19 @@ class BatchProgress:
             rest = f"{seconds / 60:.0f} min"
         text = f"replicates: {done} of {total.total:.0f} done, {failed} failed, ETA {rest}"
         self._console.print(text, soft_wrap=True)
+
+
+def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH) -> str:
+    """Draw costs of a replicate, the first and the last included, by levels from least to most."""
+    places = np.linspace(0, len(costs) - 1, min(len(costs), width)).round().astype(int)
+    shown = np.asarray(costs, dtype=np.float64)[places]
+    finite = shown[np.isfinite(shown)]
+    if not finite.size:
+        return UNSOLVED * len(shown)
+    least, extent = finite.min(), np.ptp(finite) or 1.0
+    return "".join(
+        levels[round((cost - least) / extent * (len(levels) - 1))]
+        if np.isfinite(cost)
+        else UNSOLVED
+        for cost in shown
+    )

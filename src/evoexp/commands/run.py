@@ -7,6 +7,7 @@ import hashlib
 import importlib.util
 import shlex
 import sys
+import tempfile
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -58,10 +59,19 @@ def main(arguments: argparse.Namespace) -> int:
         for labelled in _that_can_run(experiment)
     ]
     runner = experiments[0].runner
-    batch = Batch(wanted, runner, outputs_root(), retry_failed=arguments.retry_failed)
-    batch.prepare()
-    left = batch.num_left_failed
-    failures = _run(batch, wanted)
+    if arguments.live and runner.backend != "loky":
+        raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
+    with contextlib.ExitStack() as stack:
+        curves = None
+        if arguments.live:
+            folder = tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True)
+            curves = Path(stack.enter_context(folder))
+        batch = Batch(
+            wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
+        )
+        batch.prepare()
+        left = batch.num_left_failed
+        failures = _run(batch, wanted, curves)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         say(f"{which}: evoexp list --failed; run again with --retry-failed")
@@ -84,7 +94,9 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
     return [each for each in experiment.conditions if not lacks[each.label]]
 
 
-def _run(batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]]) -> list[Outcome]:
+def _run(
+    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
+) -> list[Outcome]:
     """Run what is missing; return the replicates that failed."""
     if not batch.jobs:
         if batch.is_damaged:
@@ -96,7 +108,9 @@ def _run(batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]]) 
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
     failures, counts = [], Counter(job.condition_id for job in batch.jobs)
     labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    progress = BatchProgress(plain_console(), {k: (labels[k], counts[k]) for k in counts})
+    progress = BatchProgress(
+        plain_console(), {key: (labels[key], counts[key]) for key in counts}, curves
+    )
     with progress.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
             progress.advance(outcome)

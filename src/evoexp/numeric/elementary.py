@@ -15,16 +15,13 @@ branches and with short chains of dependent operations.
 """
 
 import math
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vectors import Vector, from_bits, select, to_bits
-
-Number = TypeVar("Number", float, Vector)
-"""An argument of the functions that work on vectors, too."""
+from evoexp.numeric.vectors import Number, from_bits, select, to_bits
 
 DEGREE = 0.017453292519943295  # [rad] one degree
 
@@ -73,8 +70,7 @@ def _sin_polynomial(r: Number) -> Number:
     w = z * z
     p = (_S[1] + z * _S[2]) + w * ((_S[3] + z * _S[4]) + w * _S[5])
     s = r + z * r * (_S[0] + z * p)
-    kept: Number = select(r == 0.0, r, s)  # the sign of zero
-    return kept
+    return select(r == 0.0, r, s)  # the sign of zero
 
 
 @inlined
@@ -91,8 +87,7 @@ def _cos_polynomial(r: Number) -> Number:
 @inlined
 def _quadrant(s: Number, c: Number, n: Any) -> Number:
     """Return sin(r + n π/2) from s = sin r and c = cos r."""
-    turned: Number = from_bits(to_bits(select((n & 1) != 0, c, s)) ^ ((n & 2) << 62))
-    return turned
+    return from_bits(to_bits(select((n & 1) != 0, c, s)) ^ ((n & 2) << 62))
 
 
 @inlined

@@ -103,7 +103,7 @@ def find_samples(
         store_places(places, at.samples + own, begin)
         # bisection down to eight samples, among which lengths are counted
         sample = spread(0.0) if S == VECTOR else halve(w, S, at, target, own, places)
-        sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target, 7)
+        sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target)
         store(w, at.found + own, sample)
         store_places(places, at.samples + own, begin + sample)
         instant = np.float64(S) * segment + sample
@@ -147,8 +147,7 @@ def parameter(
     below = begin + root(begin * begin + r * length * (v1 - v0) * both)
     x = r * both / below
     x = select(below > 0.0, x, spread(0.0))
-    inside: Vector = select(x < 1.0, x, spread(1.0))
-    return sample + inside
+    return sample + select(x < 1.0, x, spread(1.0))
 
 
 @inlined

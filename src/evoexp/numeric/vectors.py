@@ -119,7 +119,7 @@ for _operation, _kinds, _result, _instruction in (
     (operator.and_, _of_flags, mask_type, ir.IRBuilder.and_),
     (operator.or_, _of_flags, mask_type, ir.IRBuilder.or_),
 ):
-    _define(_operation, *_kinds, _result, _instruction)
+    _define(_operation, _kinds[0], _kinds[1], _result, _instruction)
 
 
 def _check_array(array: Any) -> None:

@@ -60,6 +60,20 @@ def num_values(shape: Shape) -> int:
     return sum(math.prod(part) for part in shape)
 
 
+def in_shape(solution: FloatArray, *shape: int) -> FloatArray:
+    """Return a flat solution in a shape, whose first size may be −1: any number.
+
+    Raises:
+        ValueError: If it has another size.
+    """
+    size = math.prod(shape)
+    rest = solution.size % size if size < 0 else abs(solution.size - size)
+    if solution.ndim != 1 or solution.size == 0 or rest:
+        must = f"a multiple of {-size} values" if size < 0 else f"{size} values"
+        raise ValueError(f"a solution has {must}, was {solution.shape}")
+    return np.ascontiguousarray(solution.reshape(shape))
+
+
 def of_place(name: str, given: FloatArray, wanted: FloatArray, unit: str) -> list[str]:
     """Return a phrase if a configuration or place is another one than the task's, of any shape.
 

@@ -14,17 +14,19 @@ from evoexp.collision.bodies.body_models import BodyModel
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.collision.box_support import coal
-from evoexp.collision.scene import Scene, obstacle_pairs, scene
+from evoexp.collision.scene import Part, Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.answers import CoverShape
+from evoexp.paths.motion import Motion
+from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
 from evoexp.planners.moveit_tasks import (
     arm_motion,
     hull_notes,
     touching,
     with_allowed_pairs,
 )
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.mesh_pieces import convex_shape
@@ -71,6 +73,42 @@ class ArmProblem:
         model = self.assembly.model
         limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
         return np.asarray(np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE)
+
+
+class ArmDefaults(PlannerDefaults):
+    """The usual answers of a planner of motions between two configurations."""
+
+    def path(self, problem: Any, solution: FloatArray) -> FloatArray:
+        """Return the configurations of a flat solution, (instants, nq) [deg]."""
+        raise NotImplementedError
+
+    def parts(self, problem: Any, motion: Motion) -> tuple[Part, ...]:
+        """Return the whole motion; arms and obstacles have margins of their own."""
+        return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
+
+    def departures(self, problem: Any, solution: FloatArray) -> list[str]:
+        """Compare start and goal of every arm with the task's, and angles with their limits."""
+        path = self.path(problem, solution)
+        found = ["there is no path, one configuration only"] if len(path) == 1 else []
+        for arm, (a, b) in enumerate(problem.arm_slices):
+            for end, row, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
+                name = f"the {end} of arm {arm + 1}"
+                found += of_place(name, path[row, a:b], wanted[a:b], "deg")
+        return found + of_limits(joint_names(path.shape[1]), path.T, problem.limits, "deg")
+
+    def notes(self, problem: Any) -> list[str]:
+        """Describe the covers of bodies, where bodies are covered."""
+        collision, bodies = problem.collision, problem.scene
+        if not isinstance(collision, CoveredCollision):
+            return []
+        first = collision.assembly.geometry.ngeoms  # the robot's bodies, then the obstacles
+        obstacles = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
+        hulls = [name for name, (shape, _, _) in obstacles if isinstance(shape, coal.ConvexBase)]
+        return [*collision.notes(problem.length_unit), *hull_notes(hulls)]
+
+    def covers(self, problem: Any) -> tuple[CoverShape, ...]:
+        """Return the circles, spheres and capsules that the search tests."""
+        return cover_shapes(problem.collision)
 
 
 def arm_problem(
@@ -155,23 +193,6 @@ def cover_shapes(
     joint, start, end, radius, _ = collision.shapes
     columns = joint.tolist(), start, end, radius.tolist()
     return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
-
-
-def cover_notes(
-    collision: SphereCollision | CoveredCollision, bodies: Scene, unit: str
-) -> list[str]:
-    """Describe the covers of bodies, where bodies are covered.
-
-    Args:
-        bodies: The exact bodies: the robot's first, then the obstacles.
-        unit: Name of the scene's unit of length.
-    """
-    if not isinstance(collision, CoveredCollision):
-        return []
-    first = collision.assembly.geometry.ngeoms
-    obstacles = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
-    hulls = [name for name, (shape, _, _) in obstacles if isinstance(shape, coal.ConvexBase)]
-    return [*collision.notes(unit), *hull_notes(hulls)]
 
 
 def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> None:

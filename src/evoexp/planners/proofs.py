@@ -7,7 +7,6 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import Certificate, certificate, is_proven
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import Planner
 from evoexp.records import FloatArray
 
 Acceptance = Literal["model", "certified", "margin"]
@@ -21,7 +20,7 @@ margins.
 KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave as it is
 
 
-def judge_motion(planner: Planner[Any], problem: Any, motion: Motion | None) -> Certificate:
+def judge_motion(planner: Any, problem: Any, motion: Motion | None) -> Certificate:
     """Judge a planner's motion by the exact bodies; without a motion the certificate is empty."""
     if motion is None:
         return Certificate()

@@ -43,7 +43,7 @@ class PlacementOptimum(Reference):
 
     def memory(self, problem: Any) -> int:
         """Return the memory of the dense search, besides the planner's."""
-        return 8 * TERM_VALUES * self.num_angles**2 + self.planner.memory(problem)
+        return 8 * TERM_VALUES * self.num_angles**2 + int(self.planner.memory(problem))
 
     def truth(self, problem: Any) -> Truth:
         """Search, polish, and judge the best by the planner's own kernels."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.planners.planner import Planner, Reproducibility
+from evoexp.planners.planner import MEMBERS, Reproducibility
 from evoexp.testing.evolution_record import demand, evolution, finished
 from evoexp.validation import Component
 
@@ -26,17 +26,15 @@ def has_one_population(condition: Condition) -> bool:
 
 
 def every_member_is_there(condition: Condition) -> None:
-    """A planner has every member of the protocol `Planner`, with the same parameters."""
+    """A planner has every member that one must have, with the same parameters."""
     planner = condition.planner
     must = "a planner must be a Component, so that a configuration can name it"
     demand(isinstance(planner, Component), condition, must, type(planner).__name__)
-    names = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
-    missing = [name for name in names if not hasattr(planner, name)]
+    missing = [name for name in MEMBERS if not hasattr(planner, name)]
     must = "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
     must += "gives the usual answers)"
     demand(not missing, condition, must, f"without {', '.join(missing)}")
-    for name in names:
-        wanted = getattr(Planner, name, None)
+    for name, wanted in MEMBERS.items():
         if not inspect.isfunction(wanted):
             continue
         method, expected = getattr(planner, name), list(inspect.signature(wanted).parameters)[1:]

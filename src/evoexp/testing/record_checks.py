@@ -59,7 +59,7 @@ def the_best_so_far_never_gets_worse(condition: Condition) -> None:
     """The best cost is the least of all generations so far, or the least that was proven."""
     found = evolution(condition)
     generations, lowest = found.generations, np.inf
-    if getattr(found.planner, "answers_are_proven", False):  # and cheaper ones may be refuted
+    if found.planner.answers_are_proven:  # and cheaper ones may be refuted
         costs = [generation.best_cost for generation in generations]
         must = "best_cost must never get worse, and be no less than the least cost so far"
         least = np.minimum.accumulate([each.best_cost_in_generation for each in generations])

@@ -139,8 +139,7 @@ def terms_agree_with_evaluate(condition: Condition) -> None:
         both_nan = math.isnan(one) and math.isnan(two)
         must = f"evaluate must give the recorded {name} of the best solution, {one!r}"
         demand(same or both_nan, condition, must, repr(two))
-    cost_of_terms, cost = getattr(found.planner, "cost_of_terms", None), found.last.best_cost
-    told = float(cost_of_terms(terms)) if cost_of_terms else math.nan
+    told, cost = float(found.planner.cost_of_terms(terms)), found.last.best_cost
     if math.isfinite(cost) and not math.isnan(told):
         must = f"cost_of_terms must give the recorded cost of the best solution, {cost!r}"
         same = math.isclose(cost, told, rel_tol=TOLERANCE, abs_tol=TOLERANCE)

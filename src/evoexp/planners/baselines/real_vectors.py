@@ -6,7 +6,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.planners.planner import COPIES, Planner, num_values
+from evoexp.planners.planner import COPIES, num_values
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import BoolArray, FloatArray
 from evoexp.validation import Count
@@ -48,7 +48,7 @@ class RealVectorControl(WrappedPlanner):
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
-        if not getattr(self.planner, "is_real_coded", False):
+        if not self.planner.is_real_coded:
             of = self.planner.component
             must = f"left out: individuals of {of} are no vectors of real numbers"
             raise SettingError("control", must, self.component)
@@ -56,16 +56,16 @@ class RealVectorControl(WrappedPlanner):
 
     def num_evaluations(self, index: int) -> int:
         """Return the planner's evaluations of a later generation, or the fewest there may be."""
-        return max(self.fewest, self.planner.num_evaluations(max(1, index)))
+        return max(self.fewest, int(self.planner.num_evaluations(max(1, index))))
 
     def memory(self, problem: Any) -> int:
         """Return the planner's estimate, and that of the drawn individuals and of matrices."""
         values = num_values(self.shape(problem))
         own = 8 * values * (COPIES * self.num_drawn + self.matrices * values)
-        return self.planner.memory(problem) + own
+        return int(self.planner.memory(problem)) + own
 
 
-def real_vectors(planner: Planner[Any], problem: Any, drawn: FloatArray) -> RealVectors:
+def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
     """Return where a search among individuals begins: as the planner's own first ones are spread.
 
     Args:
@@ -92,7 +92,7 @@ def real_vectors(planner: Planner[Any], problem: Any, drawn: FloatArray) -> Real
     least = np.maximum(own, LEAST * variance)
     covariance[diagonal] = (1.0 - SHRINKAGE) * own + SHRINKAGE * least
     covariance /= variance
-    bounds = planner.bounds(problem)  # type: ignore[attr-defined]  # real-coded ones have them
+    bounds = planner.bounds(problem)  # real-coded ones have them
     return RealVectors(template, changes, mean, covariance, float(np.sqrt(variance)), bounds)
 
 

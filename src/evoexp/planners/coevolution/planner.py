@@ -23,7 +23,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
-from evoexp.planners.answers import of_limits, of_place
+from evoexp.planners.answers import in_shape, of_limits, of_place
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.generations import NOT_FINITE, TeamSearch
 from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, evaluate_lines, measure
@@ -268,10 +268,7 @@ class Coevolution(PlannerDefaults, Component):
         return ((self.num_configurations + 2, 2),) * len(problem.start)
 
     def _paths(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        shape = (len(problem.start), self.num_configurations + 2, 2)
-        if solution.shape != (int(np.prod(shape)),):
-            raise ValueError(f"a solution has {int(np.prod(shape))} values, was {solution.shape}")
-        return solution.reshape(shape)
+        return in_shape(solution, len(problem.start), self.num_configurations + 2, 2)
 
     def _curve(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the executed curve, in absolute link angles [rad]."""

@@ -22,7 +22,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import of_limits
+from evoexp.planners.answers import in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Coding, Population
@@ -126,7 +126,7 @@ class PlacementGa(PlannerDefaults, Component):
         The algorithm finds a posture, and no way to it. The bodies of the posture are judged by
         their exact distances.
         """
-        branch, own, _ = problem.model.posture(*_two(solution))
+        branch, own, _ = problem.model.posture(*in_shape(solution, GENES))
         if branch < 0:
             return None
         q = np.array([own[PLATFORM], *(DEGREE * np.array([*solution, own[THETA_3]]))])
@@ -138,7 +138,7 @@ class PlacementGa(PlannerDefaults, Component):
         `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. Out of
         reach, θ3, X_p and the torques are NaN, criteria and cost E_m.
         """
-        branch, *both = problem.model.posture(*_two(solution))
+        branch, *both = problem.model.posture(*in_shape(solution, GENES))
         one, two = solution.tolist()
         named = {"branch": float(branch), "theta_1_deg": one, "theta_2_deg": two}
         for prefix, numbers in zip(BRANCHES, both, strict=True):
@@ -152,8 +152,8 @@ class PlacementGa(PlannerDefaults, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare θ1 and θ2 with their limits, and ask for a θ3 that reaches the target."""
-        angles = _two(solution)
-        beyond = of_limits(["θ1", "θ2"], np.array(angles)[:, None], problem.angle_limits, "deg")
+        angles = in_shape(solution, GENES)
+        beyond = of_limits(["θ1", "θ2"], angles[:, None], problem.angle_limits, "deg")
         is_feasible = problem.model.posture(*angles)[0] >= 0
         return beyond + ([] if is_feasible else ["no θ3 reaches the target within all limits"])
 
@@ -216,9 +216,3 @@ def _built(robot: MobileArm, scenario: Docking) -> tuple[Assembly, Scene]:
     """Build the robot and its scene, kept for planners that differ in weights and rates alone."""
     assembly = robot.build()
     return assembly, scene(assembly, scenario.obstacles, self_pairs=True)
-
-
-def _two(solution: FloatArray) -> tuple[float, float]:
-    if solution.shape != (GENES,):
-        raise ValueError(f"a solution has {GENES} values, was {solution.shape}")
-    return float(solution[0]), float(solution[1])

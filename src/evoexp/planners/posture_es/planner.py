@@ -30,7 +30,7 @@ from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape, Listing, joint_names, of_limits, of_place
+from evoexp.planners.answers import CoverShape, Listing, in_shape, joint_names, of_limits, of_place
 from evoexp.planners.arm_tasks import cover_shapes
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
@@ -136,7 +136,7 @@ class PostureEs(PlannerDefaults, Component):
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: straight in joint space, a posture per instant."""
-        return Motion(np.ascontiguousarray(self._postures(problem, solution)))
+        return Motion(self._postures(problem, solution))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of the last posture in its phase, and of the whole path.
@@ -222,10 +222,7 @@ class PostureEs(PlannerDefaults, Component):
         return terms
 
     def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        num = len(problem.start)
-        if solution.ndim != 1 or len(solution) == 0 or len(solution) % num:
-            raise ValueError(f"a solution has a multiple of {num} values, was {solution.shape}")
-        return solution.reshape(-1, num)
+        return in_shape(solution, -1, len(problem.start))
 
 
 class _Paths:

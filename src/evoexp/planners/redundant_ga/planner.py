@@ -24,7 +24,7 @@ from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import joint_names, of_limits, of_place
+from evoexp.planners.answers import in_shape, joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
@@ -143,7 +143,7 @@ class RedundantGa(PlannerDefaults, Component):
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: start, A, B, straight in joint space, in equal times."""
-        return Motion(np.ascontiguousarray(self._postures(problem, solution)))
+        return Motion(self._postures(problem, solution))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of both sub-paths, and the first contact of each.
@@ -190,7 +190,4 @@ class RedundantGa(PlannerDefaults, Component):
         return ((len(problem.start),),) * 3
 
     def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        num = len(problem.start)
-        if solution.shape != (3 * num,):
-            raise ValueError(f"a solution has {3 * num} values, was {solution.shape}")
-        return solution.reshape(3, num)
+        return in_shape(solution, 3, len(problem.start))

@@ -78,7 +78,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
 
 
 class _Search:
-    """A planner of OMPL at work on one problem, then shortcuts of its path; see `IteratedSearch`.
+    """A planner of OMPL on one problem, then shortcuts of its path; see `TreePaths.batches`.
 
     An iteration is a chunk of the search; `population` is the path in hand, the start alone before
     there is one.

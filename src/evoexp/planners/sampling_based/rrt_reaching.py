@@ -78,14 +78,14 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return length and contacts of a path, and how near its postures come to both places."""
-        path = self._path(problem, solution)
+        path = self.path(problem, solution)
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         via, goal = self._errors(problem, path)
         return terms | {"via_error": via, "goal_error": goal}
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start, joint limits and the two places of the tip with the task's."""
-        path = self._path(problem, solution)
+        path = self.path(problem, solution)
         names, close = joint_names(len(problem.start)), CLOSE * problem.collision.arm.lengths.sum()
         found = [
             *of_place("the start", path[0], problem.start, "rad"),

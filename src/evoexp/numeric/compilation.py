@@ -46,17 +46,11 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 class KernelAddress(numba.types.WrapperAddressProtocol):
     """A kernel that other kernels take as an argument, by its address and the types it takes.
 
-    They are compiled once for all kernels of a signature, and kept; were they handed the kernel
-    itself, numba would compile them anew for each, in every process.
+    They are compiled once for all kernels of a signature; handed the kernel itself, once for each.
     """
 
     def __init__(self, function: Callable[..., Any], signature: Any) -> None:
-        """Compile a kernel, or load it.
-
-        Args:
-            function: Decorated by `kernel`.
-            signature: numba's types of its result and its arguments.
-        """
+        """Compile a function decorated by `kernel`, or load it, by numba's types of it."""
         compiled: Any = function
         compiled.compile(signature.args)
         result = compiled.get_compile_result(signature)

@@ -3,8 +3,8 @@
 The functions are scalar and meant to be called inside kernels: LLVM inlines them, and an innermost
 loop over an array becomes vector code. They use only `+ − × ÷ sqrt`, comparisons and the bits of
 numbers, which IEEE 754 fixes to the last bit: no libm, no fused multiply-add. So scalar and vector
-code, any vector width and any optimisation level give the same bits. `sin`, `cos` and `sincos` take
-vectors (`numeric.vectors`), too. Integer and float32 arguments count as float64. Error bounds are
+code, any vector width and any optimisation level give the same bits. `sincos` takes vectors
+(`numeric.vectors`), too. Integer and float32 arguments count as float64. Error bounds are
 the largest error measured against 80-bit arithmetic, rounded up; u = 1.11e-16 is half a unit in the
 last place of 1.
 
@@ -91,26 +91,12 @@ def _quadrant(s: Number, c: Number, n: Any) -> Number:
 
 
 @inlined
-def sin(x: Number) -> Number:
-    """Return the sine of x [rad].
+def sincos(x: Number) -> tuple[Number, Number]:
+    """Return (sin x, cos x) of x [rad].
 
     Absolute error ≤ 1.3e-16 for |x| ≤ 1.6e6; it grows beyond, and past 1e15 the result means
     nothing. sin(±0) = ±0; NaN for infinities and NaN.
     """
-    r, n = _reduce(x)
-    return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n)
-
-
-@inlined
-def cos(x: Number) -> Number:
-    """Return the cosine of x [rad]; error and domain as of `sin`."""
-    r, n = _reduce(x)
-    return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n + 1)
-
-
-@inlined
-def sincos(x: Number) -> tuple[Number, Number]:
-    """Return (sin x, cos x) of x [rad], the same bits as `sin` and `cos` for the price of one."""
     r, n = _reduce(x)
     s, c = _sin_polynomial(r), _cos_polynomial(r)
     return _quadrant(s, c, n), _quadrant(s, c, n + 1)
@@ -351,15 +337,9 @@ def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> 
 def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> NDArray[np.float64]:
     """Draw standard normal deviates by the polar method of Marsaglia & Bray 1964, from `random()`.
 
-    Args:
-        rng: Advanced by 2 uniforms per attempt; an attempt yields a pair of deviates with
-            probability π/4. So n deviates consume no fixed number of uniforms: 1.27 n on average, 2
-            ceil(n/2) at least. Nothing is kept between calls: an odd n discards the second deviate
-            of its last pair.
-        size: Number of deviates, or the shape of the array.
-
-    Returns:
-        Deviates of mean 0 and variance 1  # size [-].
+    An attempt takes 2 uniforms and yields a pair of deviates with probability π/4: n deviates
+    consume no fixed number, 1.27 n on average. An odd n discards the second deviate of its last
+    pair.
     """
     out = np.empty(size)
     with rng.bit_generator.lock:

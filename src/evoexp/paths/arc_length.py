@@ -68,13 +68,10 @@ def write_speeds(
 def integrate_speed(
     w: FloatArray, joints: np.uint64, N: np.uint64, S: np.uint64, at: Layout
 ) -> tuple[Vector, Vector]:
-    """Write the speeds and lengths of all samples of eight paths; see `workspace`.
+    """Write speeds and lengths of all samples of eight paths; return the first and last length.
 
     The speeds of a block of eight samples are on their way, in the processor's one unit for roots,
     while the lengths of the block before are summed.
-
-    Returns:
-        Lengths up to the first sample and to the last one.
     """
     nothing, h = spread(0.0), 1.0 / np.float64(S)
     here = at.speeds

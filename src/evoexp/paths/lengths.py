@@ -13,13 +13,10 @@ VECTOR, ONE = np.uint64(LANES), np.uint64(1)
 def measure_paths(
     via_points: FloatArray, arm_slices: IntArray, lengths: FloatArray, unevenness: FloatArray
 ) -> None:
-    """Write length and unevenness of every arm's path.
+    """Write length and unevenness of every arm's path, each (arms, lanes).
 
-    Args:
-        via_points: (nq, N + 1, lanes), lanes a multiple of eight.
-        arm_slices: (arms, 2) rows of each arm.
-        lengths: (arms, lanes), written: the sum of the distances d_i of neighbours (Eqs. 2, 3).
-        unevenness: (arms, lanes), written: the sum of |d_i − their mean| (Eqs. 4, 5).
+    The via-points are (nq, N + 1, lanes), lanes a multiple of eight. The length is the sum of the
+    distances d_i of neighbours (Eqs. 2, 3), the unevenness that of |d_i − their mean| (Eqs. 4, 5).
     """
     num, pitch = np.uint64(via_points.shape[1] - 1), np.uint64(via_points.shape[2])
     points, steps = borrowed(via_points.reshape(-1)), np.empty(num * VECTOR)

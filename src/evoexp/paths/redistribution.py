@@ -87,10 +87,7 @@ def find_samples(
     total: Vector,
     places: Offsets,
 ) -> None:
-    """Write every target and the last sample of its segment not beyond it, or the first.
-
-    Their places, and those of the segments, are written, too.
-    """
+    """Write targets, the last sample of every segment not beyond it, and their places."""
     segment = spread(0.0)
     for i in range(U1, N):
         own = i * VECTOR
@@ -131,12 +128,7 @@ def halve(
 def parameter(
     target: Vector, sample: Vector, speeds: tuple[Vector, Vector], lengths: tuple[Vector, Vector]
 ) -> Vector:
-    """Return where a target lies between two samples, in samples from the segment's begin.
-
-    Args:
-        sample: The first of both, counted within its segment.
-        lengths: Up to both.
-    """
+    """Return where a target lies between two samples, in samples from the segment's begin."""
     v0, v1 = speeds
     length = lengths[1] - lengths[0]
     r = target - lengths[0]

@@ -9,15 +9,10 @@ from evoexp.records import FloatArray
 
 @kernel
 def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
-    """Move every via-point by `delta` toward the middle of its neighbours, in place and in order.
+    """Move via-points (nq, N + 1, lanes) by `delta` toward the middle of their neighbours.
 
     This is one sweep of the loop of Rana & Zalzala 1995, Eqs. 8 and 9, as it is written: point i
-    sees point i − 1 as already moved. The ends stay.
-
-    Args:
-        via_points: (nq, N + 1, lanes) paths; lanes a multiple of eight.
-        delta: Part of the way, in (0, 1].
-        num_lanes: Lanes that are treated, a multiple of eight.
+    sees point i − 1 as already moved. The ends stay. `num_lanes` is a multiple of eight.
     """
     flat, pitch = borrowed(via_points.reshape(-1)), np.uint64(via_points.shape[2])
     num_points = np.uint64(via_points.shape[1])

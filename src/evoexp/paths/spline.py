@@ -30,12 +30,7 @@ def fit_splines(
 ) -> None:
     """Copy the coordinates of eight paths to the knots in w and solve for m (Thomas algorithm).
 
-    Args:
-        first: Place of point 0 of the arm's first joint there, for the first of the paths.
-        pitch: Distance of two points there.
-        N: Number of segments.
-        pivots: Factor of the splines' system.
-        at: Places in it.
+    `first` is the place of point 0 of the arm's first joint, `pitch` the distance of two points.
     """
     to_joint = (N + U1) * pitch
     for joint in range(joints):

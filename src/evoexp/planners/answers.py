@@ -1,8 +1,7 @@
 """Answers of a planner beside motions: judged populations, tables, covers, departures.
 
-Departures are ways in which a solution is none of the task, each in a phrase for people. A motion
-that never leaves the start touches nothing and is certified; only its ends tell that it does not do
-what was asked for.
+A motion that never leaves the start touches nothing and is certified; only its departures tell that
+it does not do what was asked for.
 """
 
 import math
@@ -92,6 +91,12 @@ def of_limits(names: Sequence[str], values: FloatArray, limits: FloatArray, unit
         for name, beyond in zip(names, np.maximum(below, above).tolist(), strict=True)
         if beyond > SAME
     ]
+
+
+def of_postures(postures: FloatArray, start: FloatArray, limits: FloatArray) -> list[str]:
+    """Compare the start of postures (postures, joints) [rad] with the task's, all with limits."""
+    at_start = of_place("the start", postures[0], start, "rad")
+    return at_start + of_limits(joint_names(len(start)), postures.T, limits, "rad")
 
 
 def joint_names(count: int) -> list[str]:

@@ -22,6 +22,7 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
 from evoexp.planners.moveit_tasks import (
     arm_motion,
+    as_motion,
     hull_notes,
     touching,
     with_allowed_pairs,
@@ -160,13 +161,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
     """Return a task as a motion between configurations, all joints relative to the link before."""
     if isinstance(task, GridMotion):
         task.blocked()  # refuses ends that are blocked
-        return ArmMotion(
-            q_start=(tuple(map(float, task.start)),),
-            q_goal=(tuple(map(float, task.goal)),),
-            security_margin=task.security_margin,
-            length_unit=task.length_unit,
-            obstacles=task.bodies(),
-        )
+        start, goal = ([tuple(map(float, end))] for end in (task.start, task.goal))
+        return as_motion(task, start, goal, task.bodies())
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
     from evoexp.collision.planar.link_collision import two_link_arms  # and its kernels
@@ -176,14 +172,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         raise SettingError("scenario.stationary", must, list(task.stationary))
     arms = two_link_arms(assembly)
     ends = task.ends(np.array([arm.base for arm in arms]), np.array([arm.lengths for arm in arms]))
-    start, goal = (tuple((one, two - one) for one, two in end.tolist()) for end in ends)
-    return ArmMotion(
-        q_start=start,
-        q_goal=goal,
-        security_margin=task.security_margin,
-        length_unit=task.length_unit,
-        obstacles=task.obstacles,
-    )
+    q_start, q_goal = ([(one, two - one) for one, two in end.tolist()] for end in ends)
+    return as_motion(task, q_start, q_goal, task.obstacles)
 
 
 def cover_shapes(

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -52,12 +53,19 @@ def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
         tuple(tuple(_typed(assembly, q)[a:b].tolist()) for a, b in assembly.arm_slices)
         for q in (task.start_configuration(assembly.joint_names), q_goal)
     )
+    return as_motion(task, start, goal, world.obstacles)
+
+
+def as_motion(
+    task: Any, start: Sequence[Any], goal: Sequence[Any], obstacles: Sequence[Any]
+) -> ArmMotion:
+    """Return a motion between two configurations [deg], arm by arm, with the margin of a task."""
     return ArmMotion(
-        q_start=start,
-        q_goal=goal,
+        q_start=tuple(start),
+        q_goal=tuple(goal),
         security_margin=task.security_margin,
         length_unit=task.length_unit,
-        obstacles=world.obstacles,
+        obstacles=tuple(obstacles),
     )
 
 

@@ -39,10 +39,9 @@ class Directions(NamedTuple):
     torque_limits: FloatArray  # (3, 2)
 
     def bounds(self) -> FloatArray:
-        """Return the finite limits, (m, 3).
+        """Return the finite limits, (m, 3): limited quantity, 1.0 (from below) or −1.0, limit.
 
-        Each row: the limited quantity (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or −1.0:
-        from below or above, the limit.
+        Quantities: 0, 1, 2 are joint angles; 3, 4, 5 torques.
         """
         limits = np.concatenate([self.joint_limits, self.torque_limits])
         rows = [
@@ -56,13 +55,11 @@ class Directions(NamedTuple):
     def theta(self, x: FloatArray) -> FloatArray:
         """Return θ1, θ2 [deg] of x, both in [−180, 180)."""
         angles = np.degrees(np.array([x[0], x[1] - x[0]]))
-        wrapped: FloatArray = angles - TURN * np.floor((angles + TURN / 2) / TURN)
-        return wrapped
+        return np.asarray(angles - TURN * np.floor((angles + TURN / 2) / TURN))
 
     def directions(self, theta: FloatArray, theta_3: float) -> FloatArray:
         """Return x of joint angles θ1, θ2 and θ3 [deg]."""
-        x: FloatArray = np.radians(np.cumsum([theta[0], theta[1], theta_3]))
-        return x
+        return np.asarray(np.radians(np.cumsum([theta[0], theta[1], theta_3])))
 
     def reaching(self, theta: FloatArray, to_the_left: bool) -> FloatArray:
         """Return x of θ1 and θ2 [rad] at which the end-effector has its height."""
@@ -71,9 +68,8 @@ class Directions(NamedTuple):
         upward = np.arcsin((self.target[1] - up[0] - up[1]) / self.lengths[2])
         third = np.pi - upward if to_the_left else upward
         # θ3 in [−π, π)
-        return np.array(
-            [one, both, third - 2.0 * np.pi * np.floor((third - both + np.pi) / (2.0 * np.pi))]
-        )
+        turns = np.floor((third - both + np.pi) / (2.0 * np.pi))
+        return np.array([one, both, third - 2.0 * np.pi * turns])
 
     def links(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the extents of the links along x and along y, both (3, …), at directions x."""
@@ -128,13 +124,7 @@ def _sincos(x: FloatArray, sines: FloatArray, cosines: FloatArray) -> None:
 
 
 def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
-    """Return the criteria of a planner's model.
-
-    Args:
-        model: The planner's model.
-        angle_limits: (2, 2) of the planner's genes [deg]; a range of less than a turn limits θ1 or
-            θ2.
-    """
+    """Return the criteria of a planner's model; `angle_limits` below a turn limit θ1 or θ2."""
     task, joints = np.array(model.task), model.limits[:3].copy()
     for k, (least, greatest) in enumerate(angle_limits):
         if greatest - least < TURN:
@@ -154,11 +144,7 @@ class End(NamedTuple):
 
 
 class Programme:
-    """Minimise smooth(x) + λ t, t above every |α τ|, height 0, no margin negative; no t if λ is 0.
-
-    Attributes:
-        minimax: Whether t is a variable.
-    """
+    """Minimise smooth(x) + λ t, t above all |α τ|, height 0, no margin negative; no t if λ is 0."""
 
     def __init__(self, model: Directions) -> None:
         """Take the criteria."""

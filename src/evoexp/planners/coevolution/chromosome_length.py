@@ -44,11 +44,7 @@ def length_notes(
 ) -> list[str]:
     """Compare this chromosome, line by line, with Eqs. 2 and 3 and with the paper's numbers.
 
-    Args:
-        lengths: (robots, 2) of the links [length unit].
-        start: (robots, 2) link angles [rad].
-        goal: (robots, 2) [rad].
-        chromosome_length: L.
+    Lengths of the links are (robots, 2) [length unit], start and goal (robots, 2) [rad].
     """
     notes = []
     segments = chromosome_length // 2 + 1

@@ -1,30 +1,30 @@
 """One run of co-evolving populations: the way from a generation to the next (Fig. 2).
 
-Of robots that are lines several generations are one call of a kernel: with populations of 100,
-Python between the steps would take a third of the time. Others are evaluated by
-`Coevolution.evaluated`, one generation after the other.
+Of robots that are lines several generations are one call of a kernel: Python between the steps
+would take a third of the time. Others are evaluated by `Coevolution.evaluated`.
 """
 
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from evoexp.evolution.best_team import BestTeam
 from evoexp.evolution.hall_of_fame import Hall, HallRules
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
+    Evaluated,
     Heredity,
     LineTask,
-    breed_robots,
     evaluate_lines,
     renew,
+    survey,
 )
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
-from evoexp.planners.coevolution.teams import Evaluated, survey, teamable_costs
 from evoexp.planners.driver import TableSearch, generations_per_call
 from evoexp.planners.planner import Candidate
 from evoexp.records import FloatArray, IntArray
@@ -45,16 +45,6 @@ class Table(NamedTuple):
     teams: IntArray  # (places, robots) the best team of each; −1 if there is none
     team_costs: FloatArray  # (places,) inf if there is none
 
-    @classmethod
-    def room(cls, places: int, robots: int, genes: int, count: int) -> Self:
-        """Return memory for some generations."""
-        return cls(
-            np.empty((places, robots, genes, count)),
-            Evaluated.room(places, robots, count),
-            np.empty((places, robots), dtype=np.int64),
-            np.empty(places),
-        )
-
 
 @kernel
 def evolve(
@@ -71,11 +61,7 @@ def evolve(
     summaries: FloatArray,  # (places, 4) written: see `TableSearch`
     taken: IntArray,  # (generations,) written: how many numbers each of them took
 ) -> bool:
-    """Go on from one generation of lines to others.
-
-    Returns:
-        False if a coordinate is not finite.
-    """
+    """Go on from one generation of lines to others; return False if a coordinate is not finite."""
     table, summaries, taken = borrowed((table, summaries, taken))
     populations, places, begin = table.populations, len(summaries), 0
     for step in range(len(rates)):
@@ -118,31 +104,33 @@ def follow(
 ) -> int:
     """Renew the hall of fame, and breed the generation that follows one.
 
-    Returns:
-        How many numbers it took.
+    It has offspring, then elites, then members of the hall, unchanged. Returns how many numbers it
+    took: uniform in [0, 1), for each moving robot those of parents, cross-over, mutation.
     """
+    rules = heredity.breeding
     own, other = index % len(table.team_costs), (index + 1) % len(table.team_costs)
-    hall, before, judged = heredity.hall, table.populations[own], table.judged
+    hall, before, judged = heredity.hall, table.populations[own], at_place(table.judged, own)
     if len(hall.teams):
-        num_teams[0] = renew(
-            before,
-            judged.criteria[own],
-            judged.collisions[own],
-            teamable_costs(judged.own[own], judged.blocked[own]),
-            table.teams[own],
-            num_teams[0],
-            heredity,
-        )
-    moving = 0
+        num_teams[0] = renew(before, judged, table.teams[own], num_teams[0], heredity)
+    teams, num_elites, taken = hall.teams[: num_teams[0]], heredity.num_elites, 0
+    size, count = np.sum(rules.sizes[len(teams)]), before.shape[2] - num_elites - len(teams)
+    parents, elites = np.empty(count, dtype=np.int64), np.empty(num_elites, dtype=np.int64)
     for robot in range(len(before)):
-        moving += heredity.moving[robot]
-    numbers, teams = np.sum(heredity.breeding.sizes[num_teams[0]]), hall.teams[: num_teams[0]]
-    draws = uniforms[: moving * numbers].reshape((moving, numbers))
-    costs, following = judged.costs[own], table.populations[other]
-    breed_robots(
-        select, cross, mutate, draws, index, rate, before, costs, teams, heredity, following
-    )
-    return int(moving * numbers)
+        genes, population = table.populations[other, robot], before[robot]
+        costs, normals = judged.costs[robot], np.empty((0, 0))
+        if not heredity.moving[robot]:
+            genes[:] = population
+            continue
+        draws, taken = uniforms[taken : taken + size], taken + size
+        genomes = population, parents, genes
+        breed(select, cross, mutate, draws, normals, index, rate, rules, costs, *genomes)
+        # elites and members of the hall, untouched
+        choose_elites(costs, elites)
+        copy_members(population, elites, genes, count)
+        copy_members(population, teams[:, robot], genes, count + num_elites)
+    for k in range(len(teams)):
+        teams[k] = count + num_elites + k
+    return int(taken)
 
 
 def per_call(robots: int, count: int) -> int:
@@ -162,12 +150,15 @@ class TeamSearch(TableSearch):
         stepwise = not problem.collision.is_lines or ga.restart_after is not None
         self._at_once = not stepwise and self._proven is None
         super().__init__(ga, per_call(robots, self._size) if self._at_once else 1)
-        self._table = Table.room(
-            self.num_places, robots, 2 * planner.num_configurations, self._size
+        num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
+        self._table = Table(
+            np.empty((self.num_places, robots, num_genes, self._size)),
+            Evaluated.room(self.num_places, robots, self._size),
+            np.empty((self.num_places, robots), dtype=np.int64),
+            np.empty(self.num_places),
         )
         self.costs, self._waiting = self._table.judged.costs, 0
         by_genome, operators = ga.hall_distinct == "genome", ga.operators
-        num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
         genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
         counts = [free - teams for teams in range(ga.num_hall_teams + 1)]
         self._operators = operators.addresses

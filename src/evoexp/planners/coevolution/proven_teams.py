@@ -7,7 +7,7 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.evolution.best_team import BestTeam, best_team
-from evoexp.planners.coevolution.teams import Evaluated
+from evoexp.planners.coevolution.kernels import Evaluated
 from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
 

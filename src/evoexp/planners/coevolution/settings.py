@@ -5,7 +5,6 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
-from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import PopulationSettings
 from evoexp.evolution.operators.breeding import Operators
 from evoexp.evolution.operators.crossover import OnePoint
@@ -50,44 +49,21 @@ class CoevolutionSettings(PopulationSettings):
 
     @model_validator(mode="after")
     def _settings_agree(self) -> Self:
-        no_hall, no_rule = self.hall_depth == 0.0, "null where there is no hall (hall_depth is 0)"
+        rate, demand = self.mutation_rate, self.demand
+        demand("mutation_decay", self.mutation_decay <= rate, f"at most mutation_rate ({rate})")
+        has_hall, no_hall = self.hall_depth > 0.0, "where there is no hall (hall_depth is 0)"
+        must = "0, or large enough for one pair (at least 1/population_size)"
+        demand("hall_depth", not has_hall or self.num_hall_teams > 0, must)
+        demand("hall_memory", has_hall or self.hall_memory is None, f"null {no_hall}")
+        demand("hall_frozen", has_hall or not self.hall_frozen, f"false {no_hall}")
+        demand("hall_distinct", has_hall or self.hall_distinct == "genome", f"genome {no_hall}")
+        must = "null where the hall is frozen (hall_frozen)"
+        demand("hall_memory", not self.hall_frozen or self.hall_memory is None, must)
         most = self.population_size - self.num_hall_teams
-        for wrong, field, must in (
-            (
-                self.mutation_decay > self.mutation_rate,
-                "mutation_decay",
-                f"at most mutation_rate ({self.mutation_rate})",
-            ),
-            (
-                not no_hall and self.num_hall_teams == 0,
-                "hall_depth",
-                "0, or large enough for one pair (at least 1/population_size)",
-            ),
-            (no_hall and self.hall_memory is not None, "hall_memory", no_rule),
-            (no_hall and self.hall_frozen, "hall_frozen", no_rule.replace("null", "false")),
-            (
-                no_hall and self.hall_distinct != "genome",
-                "hall_distinct",
-                no_rule.replace("null", "genome"),
-            ),
-            (
-                self.hall_frozen and self.hall_memory is not None,
-                "hall_memory",
-                "null where the hall is frozen (hall_frozen)",
-            ),
-            (
-                self.num_offspring < 0,
-                "num_elites",
-                f"at most population_size less the hall's teams ({most})",
-            ),
-            (
-                self.mutation is not None and self.mutation.takes_normals,
-                "mutation",
-                "one that takes uniform numbers only",
-            ),
-        ):
-            if wrong:
-                raise SettingError(field, must, getattr(self, field))
+        must = f"at most population_size less the hall's teams ({most})"
+        demand("num_elites", self.num_offspring >= 0, must)
+        takes_normals = self.mutation is not None and self.mutation.takes_normals
+        demand("mutation", not takes_normals, "one that takes uniform numbers only")
         return self
 
     @property

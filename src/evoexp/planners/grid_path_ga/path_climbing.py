@@ -53,11 +53,7 @@ class PathClimbing(WrappedPlanner):
 
 
 class _Climbing(PathTable):
-    """One run, and memory for its kernels.
-
-    Numbers are drawn when the last ones are used up. Each generation is recorded with the generator
-    as it is behind that generation.
-    """
+    """One run, and memory for its kernels; generations have the generator behind each of them."""
 
     def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int) -> None:
         super().__init__(planner.ga, PER_CALL)

@@ -17,11 +17,7 @@ from evoexp.paths.motion import Motion
 def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: bool) -> Grid:
     """Return a grid without the moves that the certifier does not prove, in either direction.
 
-    Args:
-        grid: The grid; a length unit lies between its nodes.
-        scene: The bodies: a platform whose configuration is its place, and obstacles.
-        security_margin: Clearance that the task requires [length unit].
-        by_margin: Whether moves must keep it, or be free of contact only.
+    A length unit lies between its nodes. With `by_margin` moves must keep the security margin.
     """
     neighbours = grid.neighbours.copy()
 

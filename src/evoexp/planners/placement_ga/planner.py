@@ -69,9 +69,8 @@ class PlacementGa(PlannerDefaults, Component):
 
     @model_validator(mode="after")
     def _has_no_motion(self) -> Self:
-        if self.acceptance != "model":
-            must = "'model': the answer is a posture, there is no motion to prove"
-            raise SettingError("acceptance", must, self.acceptance)
+        must = "'model': the answer is a posture, there is no motion to prove"
+        self.demand("acceptance", self.acceptance == "model", must)
         return self
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
@@ -79,10 +78,8 @@ class PlacementGa(PlannerDefaults, Component):
         check_range("planner.angle_range", self.angle_range)
         reach = sum(robot.link_lengths)
         if abs(scenario.target[1]) > reach:
-            must = (
-                f"within the arm's reach: Y_e between −{reach:g} and {reach:g} (the links' "
-                "lengths together)"
-            )
+            must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "
+            must += "(the links' lengths together)"
             raise SettingError("scenario.target", must, list(scenario.target))
         task = Task(*robot.link_lengths, *scenario.target, *scenario.force)
         avoided = self.objective.avoided(scenario.obstacle_points())
@@ -174,41 +171,37 @@ class _Search(ScaledSearch):
         super().__init__(ga, PER_CALL, BLOCK)
         self._planner, self._problem = planner, problem
         self._judging = planner.strings_of(problem), problem.model
-        self._table = Population(
+        self.table = Population(
             np.empty((self.num_places, GENES, size), dtype=np.int64),
             np.empty((self.num_places, ROWS, size)),
         )
-        self.costs = self._table.rows[:, FIRST_CRITERION]
+        self.costs = self.table.rows[:, FIRST_CRITERION]
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
-        strings, rows = self._table.strings[0], self._table.rows[0]
+        strings, rows = present = self.at(0)
         strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
         kernels.judge(strings, *self._judging, strings.shape[1], rows)
-        kernels.summarise_rows(rows, self.summaries[0])
+        self.note(present, 0)
 
-    def breed(self, generation: int) -> bool:
-        """Compute the generation behind one, and summarise it."""
-        (strings, rows), num = self._table, self.num_places
-        present, following = (
-            Population(strings[g % num], rows[g % num]) for g in (generation, generation + 1)
-        )
-        suffices = kernels.advance(
-            self.draws.block, *self._judging, present, following, self.chosen
-        )
-        if suffices:
-            kernels.summarise_rows(following.rows, self.summaries[(generation + 1) % num])
-        return bool(suffices)
+    def breed(self, present: Population, following: Population) -> bool:
+        """Write the population that follows another."""
+        draws, chosen = self.draws.block, self.chosen
+        return bool(kernels.advance(draws, *self._judging, present, following, chosen))
+
+    def note(self, population: Population, place: int) -> None:
+        """Summarise a generation at a place."""
+        kernels.summarise_rows(population.rows, self.summaries[place])
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return angles, criteria and whether the posture is feasible."""
-        angles = self._table.rows[place, :GENES, individual].copy()
-        _, *criteria, branch = self._table.rows[place, FIRST_CRITERION:, individual].tolist()
+        angles = self.table.rows[place, :GENES, individual].copy()
+        _, *criteria, branch = self.table.rows[place, FIRST_CRITERION:, individual].tolist()
         return Candidate(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
 
     def population(self, index: int) -> IntArray:
         """Return the strings."""
-        return np.asarray(self._table.strings[index % self.num_places])
+        return np.asarray(self.at(index).strings)
 
 
 @lru_cache(maxsize=32)

@@ -30,7 +30,7 @@ from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape, Listing, in_shape, joint_names, of_limits, of_place
+from evoexp.planners.answers import CoverShape, Listing, in_shape, of_postures
 from evoexp.planners.arm_tasks import cover_shapes
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
@@ -156,12 +156,7 @@ class PostureEs(PlannerDefaults, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare the start with the task's, and all postures with the joint limits."""
-        postures = self._postures(problem, solution)
-        names = joint_names(len(problem.start))
-        return [
-            *of_place("the start", postures[0], problem.start, "rad"),
-            *of_limits(names, postures.T, problem.limits, "rad"),
-        ]
+        return of_postures(self._postures(problem, solution), problem.start, problem.limits)
 
     def listing(self, problem: Problem, solution: FloatArray) -> Listing:
         """Return a table with one row per posture: phase, terms, cost, step from the one before."""
@@ -198,10 +193,8 @@ class PostureEs(PlannerDefaults, Component):
         """Describe the collision model and list the body pairs that it skips."""
         objects = zip(problem.task.names, problem.task.objects, strict=True)
         hulls = [name for name, each in objects if each.shape == "hull"]
-        return (
-            *problem.bodies.notes(problem.task.length_unit, is_complete=True),
-            *hull_notes(hulls),
-        )
+        own = problem.bodies.notes(problem.task.length_unit, is_complete=True)
+        return *own, *hull_notes(hulls)
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the spheres or capsules around the robot's bodies."""
@@ -283,6 +276,5 @@ def dense(postures: FloatArray) -> FloatArray:
     """Return configurations (nq, n) along the straight motion through postures (postures, nq)."""
     shares = np.arange(DENSE) / DENSE
     between = postures[:-1, None, :] + shares[:, None] * np.diff(postures, axis=0)[:, None, :]
-    return np.ascontiguousarray(
-        np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]]).T
-    )
+    every = np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]])
+    return np.ascontiguousarray(every.T)

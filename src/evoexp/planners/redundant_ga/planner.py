@@ -24,13 +24,13 @@ from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape, joint_names, of_limits, of_place
+from evoexp.planners.answers import in_shape, of_postures
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
+from evoexp.planners.redundant_ga.kernels import Judging, judge_paths
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.planners.redundant_ga.sub_path import TERMS, Search
-from evoexp.planners.redundant_ga.sub_path_costs import Judging, judge_paths
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
@@ -99,10 +99,7 @@ class RedundantGa(PlannerDefaults, Component):
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures A and B, uniform within the joint limits, (2, joints, count)."""
         low, high = problem.joint_limits.T
-        postures = rng.random((2, len(low), count))
-        postures *= (high - low)[:, None]
-        postures += low[:, None]
-        return postures
+        return np.asarray(low[:, None] + (high - low)[:, None] * rng.random((2, len(low), count)))
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge pairs of postures A and B (2, joints, individuals): what random search draws.
@@ -112,13 +109,9 @@ class RedundantGa(PlannerDefaults, Component):
         """
         starts = np.repeat(problem.start[:, None], population.shape[2], axis=1)
         first, second = np.ascontiguousarray(population)
-        terms = np.concatenate(
-            [
-                judge_paths(starts, first, self.judging(problem, 0)),
-                judge_paths(first, second, self.judging(problem, 1)),
-            ]
-        )
-        named = dict(zip(TERMS, terms, strict=True))
+        via = judge_paths(starts, first, self.judging(problem, 0))
+        goal = judge_paths(first, second, self.judging(problem, 1))
+        named = dict(zip(TERMS, (*via, *goal), strict=True))
         cost = np.where(self.successful(0, named["of_sp1"]), named["of_sp2"], np.inf)
         if self.answers_are_proven:
             Proofs(self, problem).settle(cost, lambda k: self.solution(problem, population, k))
@@ -127,15 +120,8 @@ class RedundantGa(PlannerDefaults, Component):
 
     def judging(self, problem: Problem, path: int) -> Judging:
         """Return collision model and objective of a sub-path (0: SP1, 1: SP2)."""
-        collision = problem.collision
-        return Judging(
-            collision.arm,
-            collision.ellipses,
-            collision.path,
-            problem.targets[path],
-            problem.boxes[path],
-            self.objective.weights,
-        )
+        own, (target, box) = problem.collision, (problem.targets[path], problem.boxes[path])
+        return Judging(own.arm, own.ellipses, own.path, target, box, self.objective.weights)
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return a pair of postures A and B as a flat solution."""
@@ -165,12 +151,7 @@ class RedundantGa(PlannerDefaults, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare the start with the task's, and all postures with the joint limits."""
-        postures = self._postures(problem, solution)
-        names = joint_names(len(problem.start))
-        return [
-            *of_place("the start", postures[0], problem.start, "rad"),
-            *of_limits(names, postures.T, problem.joint_limits, "rad"),
-        ]
+        return of_postures(self._postures(problem, solution), problem.start, problem.joint_limits)
 
     def judge_plan(self, problem: Problem, solution: FloatArray) -> FloatArray:
         """Return cost, position error and joint displacement of both sub-paths, (2, 3)."""

@@ -23,8 +23,7 @@ from evoexp.planners.planner import Candidate, Reproducibility
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
 from evoexp.planners.sampling_based.settings import OmplSettings
-from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import EdgeTest
+from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
@@ -51,9 +50,8 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
         from ompl import geometric  # of its Python packages some have more algorithms than others
 
         if not hasattr(geometric, self.algorithm):
-            must = (
-                f"another algorithm: the OMPL that is installed has no {self.algorithm} in Python"
-            )
+            must = "another algorithm: the OMPL that is installed has no "
+            must += f"{self.algorithm} in Python"
             raise SettingError("planner.algorithm", must, self.algorithm)
         for name in ("num_shortcuts", "num_smoothings"):
             if getattr(self, name) and self.algorithm not in DONE_WITH_A_PATH:
@@ -80,8 +78,8 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
 class _Search:
     """A planner of OMPL on one problem, then shortcuts of its path; see `TreePaths.batches`.
 
-    An iteration is a chunk of the search; `population` is the path in hand, the start alone before
-    there is one.
+    An iteration is a chunk of the search; `population` is the path in hand, at first the start
+    alone.
     """
 
     def __init__(self, planner: OmplPlanner, problem: ArmProblem, seed: int) -> None:
@@ -179,11 +177,7 @@ class _Library:
         self._nq, self._start, self._goal = nq, problem.start, problem.goal
 
     def solve(self, most: int) -> FloatArray | None:
-        """Search until so many configurations were asked for.
-
-        Returns:
-            (nodes, nq) the best path so far [deg]; None: no path from start to goal yet.
-        """
+        """Search until so many were asked for; return the best path (nodes, nq) [deg], or None."""
         self._planner.solve(self._enough(most))
         if not self._problem.hasExactSolution():
             return None

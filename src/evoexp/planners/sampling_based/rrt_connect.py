@@ -19,8 +19,7 @@ from evoexp.planners.planner import Candidate
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import InIterations, NodePaths
 from evoexp.planners.sampling_based.settings import RrtSettings
-from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import TreePair
+from evoexp.planners.sampling_based.trees import ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.validation import Component
 
@@ -77,10 +76,7 @@ class _Search:
         return self.pair.nodes
 
     def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
-        """Grow the trees toward a random configuration, or try some shortcuts of the path.
-
-        Returns the length of the path in hand after each iteration [deg], inf without one.
-        """
+        """Grow the trees, or try some shortcuts; return the length after each [deg], or inf."""
         if self._is_done():
             self._keep_shortest()
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)

@@ -18,7 +18,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.answers import joint_names, of_limits, of_place
+from evoexp.planners.answers import of_postures
 from evoexp.planners.planner import Candidate, JudgementArrays
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
@@ -30,8 +30,7 @@ from evoexp.planners.sampling_based.node_paths import (
     path_length,
 )
 from evoexp.planners.sampling_based.settings import ReachingSettings
-from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
+from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import bring_tip_to, tip
@@ -69,10 +68,7 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
         return (1 + self.num_restarts) * 2 * (2 * self.max_iterations + self.num_shortcuts) + 1
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
-        """Judge paths (joints, postures, individuals) [rad]: their length in degrees.
-
-        It is inf where a tested edge collides.
-        """
+        """Judge paths (joints, postures, individuals) [rad]: length [deg], inf in collision."""
         edges = EdgeTest(problem.collision, self.resolution)
         return judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
 
@@ -85,12 +81,8 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start, joint limits and the two places of the tip with the task's."""
-        path = self.path(problem, solution)
-        names, close = joint_names(len(problem.start)), CLOSE * problem.collision.arm.lengths.sum()
-        found = [
-            *of_place("the start", path[0], problem.start, "rad"),
-            *of_limits(names, path.T, problem.joint_limits, "rad"),
-        ]
+        path, close = self.path(problem, solution), CLOSE * problem.collision.arm.lengths.sum()
+        found = of_postures(path, problem.start, problem.joint_limits)
         for place, error in zip(PLACES, self._errors(problem, path), strict=True):
             if error > close:
                 found.append(f"the tip misses the {place} by {error:.3g}")
@@ -181,10 +173,7 @@ class _Search:
     def _posture(
         self, rng: np.random.Generator, begin: FloatArray, target: FloatArray
     ) -> Generator[float, None, FloatArray | None]:
-        """Search free postures whose tip is at a place; return the nearest to one (joints,) [deg].
-
-        None: too many draws led to none.
-        """
+        """Return the free posture nearest to one [deg] whose tip is at a place, or None."""
         problem, planner = self._problem, self._planner
         low, high = problem.joint_limits.T
         nearest, least, count = None, np.inf, 0

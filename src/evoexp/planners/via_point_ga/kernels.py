@@ -1,7 +1,6 @@
 """One generation of strings of via-points, compiled (Rana & Zalzala 1995, section 3.4).
 
-Several generations are one call: between kernels, Python's own work would cost half as much as
-theirs. Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
+Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
 """
 
 from typing import Any, NamedTuple

@@ -23,9 +23,8 @@ from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
 from evoexp.planners.planner import COPIES, JudgementArrays, num_values
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.via_point_ga.search import ProvenSearch, Search, settle
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Problem, Strings
+from evoexp.planners.via_point_ga.strings import Problem, ProvenSearch, Search, Strings, settle
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
@@ -92,9 +91,8 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return one individual of a population as a flat solution."""
-        return np.concatenate(
-            [population[a:b, :, individual].T.ravel() for a, b in problem.arm_slices]
-        )
+        own = population[:, :, individual]
+        return np.concatenate([own[a:b].T.ravel() for a, b in problem.arm_slices])
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the joint-space motion of a solution: straight, via-points in equal times."""

@@ -19,7 +19,7 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.evolution.best_team import best_team
 from evoexp.paths.motion import Motion
-from evoexp.planners.coevolution.proven_teams import ProvenTeams
+from evoexp.planners.coevolution.generations import ProvenTeams
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.strings import settle
 from evoexp.store.log_reader import read_log

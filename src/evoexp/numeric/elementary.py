@@ -106,9 +106,8 @@ def sincos(x: Number) -> tuple[Number, Number]:
 def exact_sincos(x: float) -> tuple[float, float]:
     """Return (sin x, cos x) of x [rad], exactly 0 and ±1 where x stands for a multiple of 90°.
 
-    The float64 nearest to π is not π, so `sincos` gives 1.2e-16 for the sine of 180°. Here n times
-    the float64 nearest to π/2, which is also n times 90 times `DEGREE` up to n = 10, counts as n
-    times 90°. All other angles give the bits of `sincos`.
+    The float64 nearest to π is not π. Here n times the float64 nearest to π/2, which is also n
+    times 90 times `DEGREE` up to n = 10, counts as n times 90°; others give the bits of `sincos`.
     """
     s, c = sincos(x)
     t = x * _TWO_OVER_PI + _ROUND
@@ -199,10 +198,7 @@ def _asin_core(x: float) -> tuple[float, float]:
 
 @inlined
 def asin(x: float) -> float:
-    """Return the arcsine of x, an angle in [−π/2, π/2] [rad]; relative error ≤ 3e-16.
-
-    It is NaN for |x| > 1.
-    """
+    """Return the arcsine of x, in [−π/2, π/2] [rad]; relative error ≤ 3e-16; NaN for |x| > 1."""
     x = x * 1.0
     s, excess = _asin_core(x)
     outer = _QUARTER_PI - ((2.0 * excess - 2.0 * _QUARTER_PI_LO) - (_QUARTER_PI - 2.0 * s))
@@ -213,10 +209,7 @@ def asin(x: float) -> float:
 
 @inlined
 def acos(x: float) -> float:
-    """Return the arccosine of x, an angle in [0, π] [rad]; relative error ≤ 2.4e-16.
-
-    It is NaN for |x| > 1.
-    """
+    """Return the arccosine of x, in [0, π] [rad]; relative error ≤ 2.4e-16; NaN for |x| > 1."""
     x = x * 1.0
     s, excess = _asin_core(x)
     inner = 2.0 * _QUARTER_PI - (x - (2.0 * _QUARTER_PI_LO - (-excess if x < 0.0 else excess)))

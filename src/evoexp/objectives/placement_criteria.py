@@ -53,13 +53,9 @@ class PlacementCriteria(Component):
         return Weights(*plain, *self.torque_weights, self.greatest)
 
     def avoided(self, obstacles: FloatArray) -> FloatArray:
-        """Return the terms of Eq. 12 as a table for the kernels, (n, 5).
+        """Return the terms of Eq. 12 as a table for the kernels, (n, 5), by the obstacles' middles.
 
-        Args:
-            obstacles: (obstacles, 2) their middles.
-
-        Raises:
-            SettingError: If there is no such obstacle.
+        SettingError: there is no such obstacle.
         """
         rows = []
         for k, one in enumerate(self.avoidances):

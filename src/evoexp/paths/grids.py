@@ -67,16 +67,11 @@ class Moves(NamedTuple):
 def grid(blocked: BoolArray) -> Grid:
     """Return a grid with its permitted moves.
 
-    A diagonal move is permitted if its two nodes are also joined by lateral moves within the box
-    that they span: in the plane it is forbidden between two blocked nodes only ("It is not
-    permissible for the robot to pass between the corners of obstacle regions", Chen & Zalzala 1995,
-    section 2.1), and may touch the corner of one.
-
-    Args:
-        blocked: (nodes along x, along y[, along z]), true for a node of an obstacle.
-
-    Raises:
-        ValueError: If it has another number of dimensions than two or three.
+    `blocked` (nodes along x, along y[, along z]) is true for a node of an obstacle. A diagonal move
+    is permitted if its two nodes are also joined by lateral moves within the box that they span:
+    "It is not permissible for the robot to pass between the corners of obstacle regions" (Chen &
+    Zalzala 1995, section 2.1), and it may touch the corner of one. ValueError: not two or three
+    dimensions.
     """
     dimensions = blocked.ndim
     if dimensions not in (2, 3):

@@ -71,9 +71,7 @@ class Motion(NamedTuple):
 def cubic_motion(coefficients: FloatArray) -> Motion:
     """Return a motion from power coefficients (segments, 4, nq), lowest power first.
 
-    Raises:
-        ValueError: If their shape is another, or a segment does not begin where the one before ends
-            (to 1e-9).
+    ValueError: they have another shape, or a segment does not begin where the one before ends.
     """
     coefficients = np.ascontiguousarray(coefficients, dtype=np.float64)
     if coefficients.ndim != 3 or coefficients.shape[0] == 0 or coefficients.shape[1] != 4:

@@ -1,8 +1,4 @@
-"""Motions of arms between two configurations: start and goal in degrees, bodies, and their covers.
-
-Planners that take a robot from one configuration to another share this problem: start and goal
-within limits and free of contact, the collision model that a search tests, the exact bodies.
-"""
+"""Motions of arms between two configurations: start and goal in degrees, bodies, covers."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -115,11 +111,7 @@ class ArmDefaults(PlannerDefaults):
 def arm_problem(
     robot: Robot, scenario: ArmTask, model: TouchingSpheres | CoveredBodies
 ) -> ArmProblem:
-    """Build the robot, and check that start and goal fit it and are free of collision.
-
-    Raises:
-        SettingError: If they do not, or are not.
-    """
+    """Build the robot; a SettingError refuses a start or goal that does not fit it, or collides."""
     assembly = robot.build()
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
@@ -186,11 +178,7 @@ def cover_shapes(
 
 
 def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> None:
-    """Refuse a start or goal beyond the limits of a joint.
-
-    Raises:
-        SettingError: Naming the joint.
-    """
+    """Refuse a start or goal beyond the limits of a joint, by a SettingError that names it."""
     model, slides = assembly.model, assembly.table.slides
     for field, q in zip(FIELDS, ends, strict=True):
         low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -211,10 +199,7 @@ def _covered(
     given: ArmTask,  # the task as the scenario has it; names the pairs that may touch
     ends: tuple[FloatArray, FloatArray],
 ) -> tuple[CoveredCollision, Scene]:
-    """Return the covered bodies of a robot, and the exact ones, pairs of one arm included.
-
-    Refuse a start or goal beyond limits, or where bodies touch.
-    """
+    """Return the covered bodies, and the exact ones, pairs of one arm included; check both ends."""
     ignored: tuple[tuple[int, int], ...] = ()
     bodies = scene(assembly, task.obstacles, self_pairs=True)
     if isinstance(given, MoveitTask):
@@ -232,11 +217,7 @@ def _covered(
 
 
 def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
-    """Refuse a configuration q (nq,) [rad, m] at which exact bodies touch.
-
-    Raises:
-        SettingError: Naming the pair that overlaps most.
-    """
+    """Refuse q (nq,) [rad, m] at which exact bodies touch, by the pair that overlaps most."""
     data, placements = bodies.model.createData(), bodies.geometry.createData()
     pin.updateGeometryPlacements(bodies.model, data, bodies.geometry, placements, q)
     worst, found = 0.0, ""

@@ -31,10 +31,7 @@ def generations_per_call(most: int, size: int, cached: int) -> int:
 
 
 class TableSearch(ABC):
-    """One run, whose generations are rows of tables: number g is at place g modulo `num_places`.
-
-    The best of a generation is one individual, unless a subclass says otherwise.
-    """
+    """One run, whose generations are rows of tables: number g is at place g modulo `num_places`."""
 
     costs: FloatArray  # (places, …, individuals)
     # of the generator behind each generation computed last, where it is ahead of them
@@ -129,10 +126,7 @@ class TableSearch(ABC):
 
     @abstractmethod
     def population(self, index: int) -> NDArray[Any]:
-        """Return the population of a generation of the last call.
-
-        That of the run's last generation is hashed. It is empty where it is there no longer.
-        """
+        """Return the population of a generation of the last call; empty if it is gone."""
 
 
 class GeneticSearch(TableSearch):
@@ -181,9 +175,8 @@ class GeneticSearch(TableSearch):
 class ScaledSearch(TableSearch):
     """A run whose parents are chosen as in `scaled_selection`, by blocks of uniform numbers.
 
-    Numbers are drawn when the last ones are used up. All generations of a call are recorded with
-    the generator as it is behind the last of them: the number of generations per call enters the
-    digest.
+    All generations of a call are recorded with the generator as it is behind the last of them: the
+    number of generations per call enters the digest.
     """
 
     table: Any  # a NamedTuple of arrays, whose first axis are generations that take turns

@@ -28,10 +28,7 @@ def links_of_bodies(assembly: Assembly) -> dict[str, str]:
 
 
 def with_allowed_pairs(assembly: Assembly, task: MoveitTask) -> Assembly:
-    """Return a robot with the pairs of bodies that may touch by the task's matrix.
-
-    Of pairs that the robot itself names, the matrix has the last word.
-    """
+    """Return a robot with the pairs that may touch: the task's matrix has the last word."""
     allowed, disabled = task.allowed, set(assembly.disabled)
     for (one, link), (two, other) in combinations(links_of_bodies(assembly).items(), 2):
         may_touch = allowed.may_touch(link, other)

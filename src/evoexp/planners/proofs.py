@@ -28,10 +28,7 @@ def judge_motion(planner: Any, problem: Any, motion: Motion | None) -> Certifica
 
 
 class Proofs:
-    """Judges whole motions for a search that accepts proven ones only, each solution once.
-
-    Answers are the same on every processor; a motion that cannot be decided is not proven.
-    """
+    """Judges whole motions for a search that accepts proven ones only, each solution once."""
 
     def __init__(self, planner: Any, problem: Any) -> None:
         """Begin with no verdict; the planner's field `acceptance` is not `model`."""
@@ -70,7 +67,7 @@ class Proofs:
     def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
         """Judge individuals, the cheapest first, until one is proven; return it, None if none is.
 
-        In `costs` (individuals,) refuted ones cost inf then; what costs inf is not judged.
+        In `costs` (individuals,) refuted ones cost inf then.
         """
         while np.isfinite(costs[k := int(np.argmin(costs))]):
             if self.is_proven(solution(k)):

@@ -1,18 +1,13 @@
 """The best path over a grid: Dijkstra for length alone, else the best known one and a bound.
 
 The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no shortest-path
-algorithm minimises it. The truth is enclosed:
+algorithm minimises it. It is enclosed: from above, by the best path of the frontier of D + μ ΣS
+over all μ, or the best walk if it has no loops; from below, by walks, which may pass nodes again:
+for a given number N of nodes a walk's cost ε D + (λ / N) ΣS is a sum over moves and nodes, whose
+least value dynamic programming finds, the exact optimum where nodes may be passed again.
 
-- from above, by valid paths: the best of the frontier of D + μ ΣS over all μ, or the best walk if
-  it has no loops;
-- from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
-  ε D + (λ / N) ΣS is a sum over moves and nodes, so dynamic programming over (node, number of
-  nodes) finds the best walk. The least cost of all N is the exact optimum where nodes may be passed
-  again, else a bound.
-
-Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`): every path
-of the frontier was improved by exchanges of a few nodes, and the bounds were raised by Lagrangian
-relaxation. `scripts/update-grid-truths` finds both.
+Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`), by
+exchanges of a few nodes and by Lagrangian relaxation: see `scripts/update-grid-truths`.
 """
 
 import hashlib

@@ -31,8 +31,7 @@ TERM_VALUES = 5  # numbers kept for one pair of angles
 class PlacementOptimum(Reference):
     """The exact optimum of `placement_ga`'s cost, and all local minima that the search saw.
 
-    Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first. The optimum has 15 digits,
-    more than any code of 16 bits per angle.
+    Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first.
     """
 
     component: ClassVar[str] = "placement_optimum"

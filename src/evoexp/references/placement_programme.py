@@ -80,18 +80,12 @@ class Directions(NamedTuple):
         return lengths * cosines, lengths * sines
 
     def torques(self, across: AnyArray, up: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
-        """Return the Jacobian's columns, x and y, and torques (Eq. 8), each (3, …), joint 3 first.
-
-        Sums begin at the third link: the subgradient method has the same bits everywhere.
-        """
+        """Return the Jacobian's columns, x and y, and torques (Eq. 8), (3, …), joint 3 first."""
         jx, jy = -np.cumsum(up[::-1], axis=0), np.cumsum(across[::-1], axis=0)
         return jx, jy, jx * self.force[0] + jy * self.force[1]
 
     def costs(self, across: AnyArray, up: AnyArray, greatest: AnyArray | None = None) -> AnyArray:
-        """Return E of Eq. 14 by the links' extents (3, …), without any cap.
-
-        `greatest` takes the place of the greatest |α τ| (Eq. 11), if it is given.
-        """
+        """Return E of Eq. 14 by extents (3, …), uncapped; `greatest` replaces |α τ| (Eq. 11)."""
         epsilon, lam, delta, *alphas = self.weights
         jx, jy, torques = self.torques(across, up)
         if greatest is None:
@@ -153,10 +147,7 @@ class Programme:
         self._where = b""
 
     def measured(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return objective, height and margins at z, (2 + margins,), and their derivatives.
-
-        These are (2 + margins, len(z)), by complex steps: without any cancellation.
-        """
+        """Return objective, height, margins at z, (2 + margins,), and slopes by complex steps."""
         if z.tobytes() != self._where:
             found = self._rows(z[:, None] + 1j * STEP * np.eye(len(z)))
             self._values, self._slopes = found[:, 0].real.copy(), found.imag / STEP

@@ -13,8 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.planners.planner import Candidate, Keeper, Reproducibility
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import Candidate, Keeper, Reproducibility, WrappedPlanner
 from evoexp.records import Block, FloatArray
 
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.planners.planner import COPIES, num_values
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import COPIES, WrappedPlanner, num_values
 from evoexp.records import BoolArray, FloatArray
 from evoexp.validation import Count
 
@@ -28,10 +27,7 @@ class RealVectors(NamedTuple):
     bounds: tuple[FloatArray, FloatArray]
 
     def population(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (individuals, variables) as the planner's `cost` takes individuals.
-
-        Numbers beyond the bounds are put there.
-        """
+        """Return vectors (individuals, variables) as `cost` takes them, put within bounds."""
         found = np.repeat(self.template[..., None], len(vectors), axis=-1)
         found[self.changes] = vectors.T
         low, high = (bound[..., None] for bound in self.bounds)
@@ -66,14 +62,9 @@ class RealVectorControl(WrappedPlanner):
 
 
 def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
-    """Return where a search among individuals begins: as the planner's own first ones are spread.
+    """Return where a search begins, by a real-coded planner's `sample` `drawn`, individuals last.
 
-    Args:
-        planner: A real-coded planner, which has `bounds(problem)`.
-        drawn: Individuals of its `sample`, individuals last.
-
-    Raises:
-        SettingError: If they do not differ.
+    SettingError: the individuals do not differ.
     """
     template = np.ascontiguousarray(drawn[..., 0])
     changes = np.asarray((drawn != template[..., None]).any(axis=-1))
@@ -97,10 +88,7 @@ def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
 
 
 def transposed_root(matrix: FloatArray) -> FloatArray:
-    """Return Lᵀ of the Cholesky factor L of a positive definite matrix (n, n).
-
-    LAPACK's has other bits on other processors.
-    """
+    """Return Lᵀ of the Cholesky factor L of a matrix; LAPACK's bits depend on processors."""
     root = np.triu(matrix)  # rows are columns of L
     for k in range(len(root)):
         for i in range(k):

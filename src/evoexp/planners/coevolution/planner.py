@@ -24,8 +24,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.answers import in_shape, of_limits, of_place
-from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.generations import NOT_FINITE, TeamSearch
+from evoexp.planners.coevolution.generations import NOT_FINITE, ProvenTeams, TeamSearch
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
@@ -33,8 +32,7 @@ from evoexp.planners.coevolution.kernels import (
     evaluate_lines,
     measure,
 )
-from evoexp.planners.coevolution.proven_teams import ProvenTeams
-from evoexp.planners.coevolution.settings import CoevolutionSettings
+from evoexp.planners.coevolution.settings import CoevolutionSettings, SpeedLimit, length_notes
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, BoolArray, FloatArray
@@ -119,10 +117,7 @@ class Coevolution(PlannerDefaults, Component):
         return self.ga.population_size
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return populations of uniform genes, (robots, 2 K, count).
-
-        Robots that stand still keep their posture.
-        """
+        """Return populations of uniform genes, (robots, 2 K, count), of robots that move."""
         shape = len(problem.start), 2 * self.num_configurations, count
         return self.populations_of(problem, rng.random(shape))
 

@@ -14,14 +14,15 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
-from evoexp.collision.scene import Scene, scene
+from evoexp.collision.scene import Part, Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all
-from evoexp.paths.grids import UNREACHED, Moves, NodeArray, spread_front
+from evoexp.paths.grids import UNREACHED, Grid, Moves, NodeArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels
@@ -36,7 +37,6 @@ from evoexp.planners.grid_path_ga.kernels import (
     solution_of,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
-from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
@@ -302,3 +302,43 @@ def _weigh_moves(fields: Fields) -> SumArray:
         if not np.array_equal(table, sums):
             return tables[:0]
     return tables
+
+
+def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: bool) -> Grid:
+    """Return a grid without the moves that the certifier does not prove, in either direction.
+
+    A length unit lies between its nodes. With `by_margin` moves must keep the security margin.
+    """
+    neighbours = grid.neighbours.copy()
+
+    def judge(line: NodeArray, move: int) -> None:
+        """Forbid the moves of a line of nodes that are not proven."""
+        ends = Motion(grid.coordinates[line[[0, -1]]].astype(np.float64))
+        if is_proven((Part(scene, 0, 1),), ends, security_margin, by_margin):
+            return
+        if len(line) > 2:
+            middle = len(line) // 2
+            judge(line[: middle + 1], move)
+            judge(line[middle:], move)
+            return
+        neighbours[line[0], move] = -1
+        neighbours[line[1], neighbours[line[1]] == line[0]] = -1
+
+    for move, targets in enumerate(grid.neighbours.T):
+        # moves to nodes of greater index; the others are their ways back
+        first = np.flatnonzero(targets >= 0)[:1]
+        if len(first) and targets[first[0]] > first[0]:
+            for line in _lines(targets):
+                judge(line, move)
+    return grid._replace(neighbours=neighbours)
+
+
+def _lines(targets: NodeArray) -> Iterator[NodeArray]:
+    """Yield the nodes of each longest line of one move, which leads to `targets` (nodes,) or −1."""
+    is_target = np.zeros(len(targets), dtype=bool)
+    is_target[targets[targets >= 0]] = True
+    for node in np.flatnonzero((targets >= 0) & ~is_target):
+        line = [int(node)]
+        while targets[line[-1]] >= 0:
+            line.append(int(targets[line[-1]]))
+        yield np.array(line, dtype=np.int32)

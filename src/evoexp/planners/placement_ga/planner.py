@@ -118,11 +118,7 @@ class PlacementGa(PlannerDefaults, Component):
         return Coding(*coding, ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
-        """Return the posture of a solution as a motion that stays there; None if it is infeasible.
-
-        The algorithm finds a posture, and no way to it. The bodies of the posture are judged by
-        their exact distances.
-        """
+        """Return the posture as a motion that stays there; None: it is infeasible."""
         branch, own, _ = problem.model.posture(*in_shape(solution, GENES))
         if branch < 0:
             return None
@@ -132,8 +128,7 @@ class PlacementGa(PlannerDefaults, Component):
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return all numbers of both values of θ3, those of the worse one as `other_…`.
 
-        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. Out of
-        reach, θ3, X_p and the torques are NaN, criteria and cost E_m.
+        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible.
         """
         branch, *both = problem.model.posture(*in_shape(solution, GENES))
         one, two = solution.tolist()

@@ -1,7 +1,6 @@
 """The phases of a task: goals, held objects, permitted contacts, and the bodies of each phase.
 
-An object's place at the begin of a phase depends on the postures before; the rest is made once. A
-phase ends at the first posture that meets its goal, so a list of postures alone says which phase
+A phase ends at the first posture that meets its goal, so a list of postures alone says which phase
 each of them belongs to.
 """
 

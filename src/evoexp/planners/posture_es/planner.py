@@ -1,20 +1,18 @@
 """Postures as individuals: an evolution strategy whose winner's ancestry is the path.
 
 Corsépius 2001. An individual is one posture. The search begins with the momentary posture alone;
-every cycle generates offspring by random steps within a local scope of the parents (Fig. 2), rates
-them in configuration and in work space at once, and selects the best as the next parents. When an
-individual meets the goal, the path is its line of ancestors, from the start on: no path is planned,
-and inverse kinematics is solved on the way. A task may have several phases; each is a search of its
-own that begins at the last posture of the phase before.
+every cycle generates offspring by random steps within a local scope of the parents (Fig. 2), and
+selects the best as the next parents. When an individual meets the goal, the path is its line of
+ancestors. A task may have several phases; each is a search of its own that begins at the last
+posture before.
 
 A population is an array (nq, individuals) [rad]. A solution is flat: the ancestry, postures × nq
 [rad], from the start to the best so far, through all phases.
 
 The best so far is the individual of the lowest cost in its phase; once individuals meet the goal,
-the cheapest of these, whose cost need not be the lowest. Costs of different phases cannot be
-compared: while a phase before the last is searched, the plan's cost is inf and the phase's own cost
-is the term `cost`. Individuals that collide or pass a hard limit are rated, but are never parents;
-means and deviations leave them out.
+the cheapest of these. Costs of different phases cannot be compared: while a phase before the last
+is searched, the plan's cost is inf. Individuals that collide or pass a hard limit are never
+parents; means and deviations leave them out.
 """
 
 from collections.abc import Callable, Iterator
@@ -141,8 +139,7 @@ class PostureEs(PlannerDefaults, Component):
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of the last posture in its phase, and of the whole path.
 
-        `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not
-        reached.
+        `phase_1_end` and so on: postures, from 0, at which phases end; −1: not reached.
         """
         postures = self._postures(problem, solution)
         found, several = problem.spans(postures), len(problem.phases) > 1

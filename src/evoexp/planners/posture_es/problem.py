@@ -51,13 +51,7 @@ def prepare(
     objective: PostureCost,
     collision: CollisionModel,
 ) -> Problem:
-    """Return the problem of a task.
-
-    Raises:
-        SettingError: If a joint has no limits, the start or the scope does not fit the robot, the
-            start collides, a goal is out of reach, a contact names nothing, or a goal and the terms
-            that rate it contradict each other.
-    """
+    """Return the problem of a task; a SettingError names what contradicts robot, goals or terms."""
     assembly = _built(robot)
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)

@@ -8,11 +8,8 @@ until both are successful, up to `num_attempts` times.
 A population is an array (joints, individuals) [rad] of end postures of one sub-path, or (joints ×
 bits, individuals). A solution is flat: three postures (start, A, B) × joints [rad].
 
-The best so far is a whole plan. Only the second search has plans; a plan costs its objective of SP2
-(Eq. 4), and the plan of the lowest cost over all generations and attempts is the best so far. Until
-there is a plan of finite cost, the best posture A of any attempt so far takes its place, as a plan
-that stays there, at the cost inf. The individuals of SP1 cost their objective of SP1; the best plan
-in a generation of SP1 costs inf.
+The best so far is a whole plan, which costs its objective of SP2 (Eq. 4). Until there is a plan of
+finite cost, the best posture A so far takes its place, as a plan that stays there, at the cost inf.
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,11 +37,7 @@ CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellip
 
 
 class RedundantGa(PlannerDefaults, Component):
-    """The algorithm of Lavoie & Boudreau, sections 3 to 5.
-
-    Random search takes the generations and evaluations of one search, those of `ga`; sequential
-    search goes through the same attempts and searches as the algorithm.
-    """
+    """The algorithm of Lavoie & Boudreau, sections 3 to 5."""
 
     component: ClassVar[str] = "redundant_ga"
     goal_is_region: ClassVar[bool] = True
@@ -75,10 +68,7 @@ class RedundantGa(PlannerDefaults, Component):
     def search_in_turn(
         self, problem: Problem, rng: np.random.Generator, kind: type[Search]
     ) -> Iterator[Block]:
-        """Yield the generations of SP1 and SP2 in turn, until both are successful.
-
-        By a kind of search: the genetic algorithm, or a control in its place.
-        """
+        """Yield the generations of SP1 and SP2 in turn, until both are successful."""
         search = kind(self, problem, rng)
         for _ in range(self.num_attempts):
             via = yield from search.sub_path(problem.start)

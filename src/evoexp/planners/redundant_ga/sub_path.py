@@ -175,8 +175,7 @@ class Search(GeneticSearch):
 class DrawnSearch(Search):
     """The same search without evolution: every generation is drawn as the initial population is.
 
-    A generation draws as many individuals as the genetic algorithm breeds, and costs as many
-    evaluations. The best end is that of all draws.
+    A generation draws as many individuals as would be bred; the best end is that of all draws.
     """
 
     evolving = False

@@ -58,10 +58,9 @@ class TreePaths(PlannerDefaults):
     def batches(self, search: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until a search comes to its end.
 
-        It has `edges` (`EdgeTest`), `best_cost` (length of the shortest path so far [deg], or inf),
-        `stop_reason` (empty while it goes on), `population` (shown by a record), `candidate()` (the
-        shortest path as it is recorded), and `iterate(rng, most)`: goes on by at least one
-        iteration, returns the length in hand after each [deg]; none if all was done before.
+        It has `edges`, `best_cost` [deg], `stop_reason` (empty while it goes on), `population`
+        (shown by a record), `candidate()`, and `iterate(rng, most)`: it goes on by some iterations
+        and returns the length in hand after each [deg]; none if all was done before.
         """
         keeper = Keeper()
         for index in range(self.num_generations + 1):
@@ -127,10 +126,7 @@ class NodePaths(TreePaths, ArmDefaults, EdgeSettings):
         return EdgeTest(problem.collision, self.resolution, proofs)
 
     def cost(self, problem: ArmProblem, population: FloatArray) -> JudgementArrays:
-        """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides.
-
-        And, if so asked, where a path is not proven.
-        """
+        """Judge paths (nq, nodes, individuals): length, inf in collision or if not proven."""
         edges = self.edge_test(problem)
         judged = judge_paths(edges, population.transpose(2, 1, 0))
         feasible, segments = judged.feasible, np.full(len(judged.cost), population.shape[1] - 1)

@@ -1,12 +1,10 @@
 """Planners of the Open Motion Planning Library (Sucan et al. 2012), on the same edges.
 
-OMPL asks whether configurations and straight edges are free; both are tested by the planner's
-collision model, as densely as RRT-Connect's here, and counted. All numbers are drawn by OMPL, from
-a seed of the replicate; its code makes the last bits those of an environment.
-
-A generation is a chunk of a search that goes on: its cost and its population are the path in hand.
-A planner that ends with its first path (RRTConnect) is done then, and the path is made shorter by
-random shortcuts (Geraerts & Overmars 2007).
+OMPL asks whether configurations and straight edges are free; both are tested as densely as those of
+RRT-Connect, and counted. All numbers are drawn by OMPL, from a seed of the replicate. A generation
+is a chunk of a search that goes on: its cost and its population are the path in hand. A planner
+that ends with its first path (RRTConnect) is done then, and the path is made shorter by random
+shortcuts.
 """
 
 import importlib.util
@@ -200,11 +198,10 @@ class _Library:
 
 
 class _Roadmap(_Library):
-    """PRM*, whose roadmap grows without OMPL's second thread.
+    """PRM*, whose roadmap grows without OMPL's second thread, which waits for Python for ever.
 
-    `PRMstar.solve` looks for a path in a thread of its own, which waits for Python's lock for ever,
-    and would end the search at another moment each time. So that call only adds start and goal to
-    the roadmap, which then grows in this thread, and the shortest path over it is looked for here.
+    `PRMstar.solve` only adds start and goal; the roadmap then grows in this thread, and the
+    shortest path over it is looked for here.
     """
 
     def solve(self, most: int) -> FloatArray | None:

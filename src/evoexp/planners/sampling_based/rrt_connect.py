@@ -1,12 +1,9 @@
 """RRT-Connect: two trees that grow toward each other (Kuffner & LaValle 2000), then shortcuts.
 
-A baseline from outside the evolutionary planners: it is done with the first path that is free, and
-makes that one shorter by random shortcuts (Geraerts & Overmars 2007), as many as are asked for.
-The goal is never drawn on purpose.
-
-A generation is a batch of iterations: random configurations that the trees grow toward, then
-attempts to shorten the path. Its costs are the lengths of the path in hand after each iteration,
-inf before there is one; its population is all nodes of both trees.
+It is done with the first path that is free, and makes that one shorter by random shortcuts
+(Geraerts & Overmars 2007). The goal is never drawn on purpose. A generation is a batch of
+iterations; its costs are the lengths of the path in hand after each, inf before there is one; its
+population is all nodes of both trees.
 """
 
 from collections.abc import Iterator

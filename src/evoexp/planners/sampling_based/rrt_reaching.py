@@ -1,14 +1,12 @@
 """RRT-Connect to places of a planar arm's tip: a posture is sought at each, then a path to it.
 
-A baseline beside the search of Lavoie & Boudreau 2001. For the via point and then for the goal
-point, postures whose tip is there are found from random ones by damped least squares; the nearest
-of the free ones is the goal of two trees, and the path between them is made shorter by shortcuts.
+For the via point and then for the goal point, postures whose tip is there are found from random
+ones by damped least squares; the nearest of the free ones is the goal of two trees.
 
 A solution is flat: posture by posture, joint by joint (postures × joints) [rad], the start
-included; the start alone: no path was found, and there is no motion. A generation is a batch of
-iterations: postures drawn, configurations that trees grow toward, shortcuts tried. Its costs are
-the lengths of the plans that its iterations complete, inf elsewhere; its population is the shortest
-plan so far.
+included; the start alone: there is no motion. A generation is a batch of iterations: its costs are
+the lengths of the plans that they complete, inf elsewhere; its population is the shortest plan so
+far.
 """
 
 from collections.abc import Generator, Iterator

@@ -1,12 +1,11 @@
 """A mission in two stages: a docking place and posture, then a safe path to it.
 
-Chen & Zalzala 1995. The first stage is the placement search of section 3, the second the path
-search of section 2, whose goal is the node nearest to the docking place of the first. The motion
-follows the path from node to node, goes on to the docking place itself, and then turns the arm from
-the travel posture to the posture of the first stage.
+Chen & Zalzala 1995: the placement search of section 3, then the path search of section 2 to the
+node nearest to the docking place. The motion follows the path, goes on to the docking place itself,
+and turns the arm from the travel posture to that of the first stage.
 
 A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. Its cost is E (Eq. 14) +
-C (Eq. 1). In the first stage there is no path: the cost of the plan is inf, the individuals cost E.
+C (Eq. 1). In the first stage the cost of the plan is inf, the individuals cost E.
 """
 
 from collections.abc import Generator, Iterator

@@ -197,7 +197,7 @@ class ScaledSearch(TableSearch):
 
     @abstractmethod
     def note(self, population: Any, place: int) -> None:
-        """Write what is recorded of a generation to a place."""
+        """Write the record of a generation to a place."""
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations, each anew with more numbers if these did not suffice."""

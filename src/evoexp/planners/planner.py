@@ -29,7 +29,7 @@ COPIES = 5
 
 
 class Planner(Protocol):
-    """What a planner writes itself; `problem` is the value that its own `prepare` returned."""
+    """Members that a planner writes itself; `problem` is the value that its `prepare` returned."""
 
     # the registered name; a guest's begins with the name of its distribution
     component: ClassVar[str]

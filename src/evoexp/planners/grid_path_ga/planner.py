@@ -227,7 +227,7 @@ class _Search(PathTable, ScaledSearch):
         return bool(kernels.advance(*task, *rules, *populations, self.chosen, self._scratch))
 
     def note(self, population: Population, place: int) -> None:
-        """Write what is recorded of a generation to a place."""
+        """Write the record of a generation to a place."""
         kernels.note(population, place, self.recorded, self.summaries)
 
     def population(self, index: int) -> NodeArray:

@@ -119,18 +119,19 @@ def follow(
     size, count = np.sum(rules.sizes[len(teams)]), before.shape[2] - num_elites - len(teams)
     parents, elites = np.empty(count, dtype=np.int64), np.empty(num_elites, dtype=np.int64)
     for robot in range(len(before)):
-        genes, population = table.populations[other, robot], before[robot]
+        out, genomes = table.populations[other, robot], before[robot]
         costs, normals = judged.costs[robot], np.empty((0, 0))
         if not heredity.moving[robot]:
-            genes[:] = population
+            out[:] = genomes
             continue
         draws, taken = uniforms[taken : taken + size], taken + size
-        genomes = population, parents, genes
-        breed(select, cross, mutate, draws, normals, index, rate, rules, costs, *genomes)
+        breed(
+            select, cross, mutate, draws, normals, index, rate, rules, costs, genomes, parents, out
+        )
         # elites and members of the hall, untouched
         choose_elites(costs, elites)
-        copy_members(population, elites, genes, count)
-        copy_members(population, teams[:, robot], genes, count + num_elites)
+        copy_members(genomes, elites, out, count)
+        copy_members(genomes, teams[:, robot], out, count + num_elites)
     for k in range(len(teams)):
         teams[k] = count + num_elites + k
     return int(taken)

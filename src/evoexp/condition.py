@@ -223,15 +223,14 @@ def _nested(planner: Any) -> Iterator[Any]:
 
 def _check_roles(robot: Component, scenario: Component, planner: Component) -> None:
     """Refuse a planner that is none, or that takes no such robot or scenario."""
-    from evoexp.planners.planner import Planner  # and pinocchio, which `evoexp list` needs not
+    from evoexp.planners.planner import MEMBERS  # and pinocchio, which `evoexp list` needs not
 
-    members = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
     *_, inner = planners = list(_nested(planner))
     for each in planners:
         if not isinstance(each, Component) or not hasattr(each, "prepare"):
             raise SettingError("planner", "a planner", getattr(each, "component", each))
         kind = type(each)
-        lacking = [m for m in members if m not in kind.model_fields and not hasattr(kind, m)]
+        lacking = [m for m in MEMBERS if m not in kind.model_fields and not hasattr(kind, m)]
         if lacking:
             must = f"a planner; {kind.__module__}.{kind.__qualname__} lacks {', '.join(lacking)}"
             raise SettingError("planner", must, each.component)

@@ -38,6 +38,15 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
+    def demand(self, field: str, holds: bool, must: str) -> None:
+        """Refuse these settings by a field of which something does not hold.
+
+        Raises:
+            SettingError: If it does not.
+        """
+        if not holds:
+            raise SettingError(field, must, getattr(self, field))
+
     def canonical(self) -> dict[str, Any]:
         """Return the settings as plain data: the form that is hashed, stored and built from again.
 

@@ -45,20 +45,6 @@ def built(**changes: Any) -> CoevolutionSettings:
 
 
 @pytest.mark.parametrize(
-    ("kind", "settings", "evaluations"),
-    [
-        (GeneticSettings, SHARED, 24_050),  # as Rana & Zalzala count them
-        (RealGenetic, REAL, 24_050),
-        (BinaryGenetic, BINARY, 24_050),
-        (StrategySettings, STRATEGY, 1 + (50 + 2) + 9 * (100 + 2)),
-        (StrategySettings, STRATEGY | {"num_generations": 0}, 1),
-    ],
-)
-def test_evaluations_of_a_whole_run(kind: Any, settings: dict[str, Any], evaluations: int) -> None:
-    assert kind(**settings).num_evaluations == evaluations
-
-
-@pytest.mark.parametrize(
     ("kind", "settings", "message"),
     [
         (GeneticSettings, SHARED | {"num_elites": 51}, r"num_elites: must be at most .* \(50\)"),

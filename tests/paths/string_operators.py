@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from evoexp.paths.lengths import relax_points
 from evoexp.paths.redistribution import redistribute_arms
-from evoexp.paths.relaxation import relax_points
 from evoexp.paths.workspace import Redistribution
 
 

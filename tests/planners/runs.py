@@ -6,7 +6,6 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import Certificate
 from evoexp.condition import Condition
-from evoexp.planners.planner import Planner
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
 
@@ -34,7 +33,7 @@ def ran(chosen: Condition, seed: Any = 0) -> Run:
     return Run(planner, problem, evolved(planner, problem, seed))
 
 
-def evolved(planner: Planner[Any], problem: Any, seed: Any = 0) -> list[Any]:
+def evolved(planner: Any, problem: Any, seed: Any = 0) -> list[Any]:
     """Return all generations of a run with a seed, or a generator."""
     found = generations(planner.evolve(problem, np.random.default_rng(seed)))
     return [
@@ -42,6 +41,6 @@ def evolved(planner: Planner[Any], problem: Any, seed: Any = 0) -> list[Any]:
     ]
 
 
-def verdict(planner: Planner[Any], problem: Any, solution: Any) -> Certificate:
+def verdict(planner: Any, problem: Any, solution: Any) -> Certificate:
     """Judge a solution by the exact bodies."""
     return judge_motion(planner, problem, planner.motion(problem, solution))

@@ -19,9 +19,9 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.evolution.best_team import best_team
 from evoexp.paths.motion import Motion
-from evoexp.planners.coevolution.proven_teams import ProvenTeams
+from evoexp.planners.coevolution.generations import ProvenTeams
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.via_point_ga.search import settle
+from evoexp.planners.via_point_ga.strings import settle
 from evoexp.store.log_reader import read_log
 from matrix import counts
 from planners.runs import ran, verdict

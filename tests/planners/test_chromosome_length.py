@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes, needed_length
+from evoexp.planners.coevolution.settings import SpeedLimit, length_notes, needed_length
 
 PAPER = SpeedLimit(tcp_speed=5.0, sampling_time=0.01)
 

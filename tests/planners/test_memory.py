@@ -92,10 +92,3 @@ def test_the_estimate_is_near_the_peak(
     estimate = planner.memory(problem)
     assert measured > 4e6, "too little to be compared"
     assert estimate / FACTOR < measured < FACTOR * estimate
-
-
-@pytest.mark.parametrize("kind", [kind for kind, _, _ in RUNS], ids=str)
-def test_the_estimate_grows_with_the_population(kind: tuple[str, int]) -> None:
-    few, many = (with_population(of_kind(kind, "smoke"), size) for size in (100, 10_000))
-    estimates = [planner.memory(problem) for planner, problem in (few.prepare(), many.prepare())]
-    assert 50 * estimates[0] < estimates[1]

@@ -36,7 +36,7 @@ def evolved(chosen: Condition, seed: int) -> list[Any]:
 def test_vectors_are_the_numbers_that_differ_with_the_samples_mean_and_covariance() -> None:
     planner, problem = control("cma_es").prepare()
     drawn = planner.sample(problem, np.random.default_rng(0), 400)
-    found = real_vectors(planner, problem, drawn)
+    found = real_vectors(planner.planner, problem, drawn)
     assert found.changes.shape == (4, 21)
     assert np.array_equal(found.changes, np.pad(np.ones((4, 19), bool), ((0, 0), (1, 1))))
     inner = drawn[:, 1:-1].reshape(76, 400)
@@ -56,7 +56,7 @@ def test_cma_es_is_the_package_told_the_planners_costs(improves: bool) -> None:
     chosen = control("cma_es", "ga.num_generations=12", f"control.improves={improves}")
     planner, problem = chosen.prepare()
     rng = np.random.default_rng(5)
-    start = real_vectors(planner, problem, planner.sample(problem, rng, 1000))
+    start = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))
     plain = cmaes.CMA(
         start.mean,
         start.deviation,
@@ -82,7 +82,7 @@ def test_noisy_trajectories_move_by_their_weighted_mean() -> None:
     chosen = control("stomp", "ga.num_generations=15", "control.sensitivity=7")
     planner, problem = chosen.prepare()
     rng = np.random.default_rng(2)
-    start = real_vectors(planner, problem, planner.sample(problem, rng, 1000))
+    start = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))
     root = np.linalg.cholesky(start.covariance) * start.deviation
     middle, sigma = start.mean, 0.5
     for record in evolved(chosen, 2):

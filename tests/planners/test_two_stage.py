@@ -85,7 +85,7 @@ def test_the_first_stage_has_no_plan_yet() -> None:
     assert [row.best_cost == np.inf for row in rows] == [stage == 1.0 for stage in stages]
     assert [row.index for row in rows] == list(range(len(rows)))
     assert planner.prior_queries(problem) == 1024  # the map's nodes, 32 × 32
-    both = planner.placement.ga.num_evaluations + planner.path.ga.num_evaluations
+    both = sum(map(planner.num_evaluations, range(planner.num_generations + 1)))
     assert rows[-1].evaluations == both
 
 

@@ -60,16 +60,6 @@ def test_the_programme_and_its_derivatives_are_those_of_complex_steps(
     np.testing.assert_allclose(slow.gradient(smooth, x), plain, rtol=1e-6)
 
 
-def test_what_is_remembered_is_what_is_measured() -> None:
-    model = directions("minimax")
-    programme = Programme(model)
-    first, second = np.array([1.1, 1.9, 4.4, 2.0]), np.array([1.1, 1.9, 4.4, 2.5])
-    for z in (first, first, second, first):
-        own = [values.copy() for values in programme.measured(z)]
-        for known, expected in zip(own, Programme(model).measured(z), strict=True):
-            np.testing.assert_array_equal(known, expected)
-
-
 def test_costs_and_legality_at_directions() -> None:
     model, rng = limited("minimax"), np.random.default_rng(4)
     programme, legal = Programme(model), 0

@@ -13,7 +13,6 @@ import numpy as np
 from evoexp.batch.memory_limit import machine_memory, refuse_large
 from evoexp.batch.reproduction import FieldDifference, differing, stored_condition
 from evoexp.errors import EvoexpError
-from evoexp.planners.planner import Planner
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import flatten
 from evoexp.store.log_reader import LogContents
@@ -33,9 +32,7 @@ def contradictions(path: Path, log: LogContents) -> Iterator[str]:
         yield from map(str, _contradictions(*condition.prepare(), log))
 
 
-def _contradictions(
-    planner: Planner[Any], problem: Any, log: LogContents
-) -> Iterator[FieldDifference]:
+def _contradictions(planner: Any, problem: Any, log: LogContents) -> Iterator[FieldDifference]:
     rows = {row.index: row for row in log.generations}
     terms: Mapping[str, float] = {}
     for solution in log.solutions:
@@ -55,7 +52,7 @@ def _contradictions(
                 return
             continue  # what costs inf may be no solution at all
         yield from _unlike(row.terms, terms, f"{name}: ")
-        cost = float(getattr(planner, "cost_of_terms", lambda terms: math.nan)(terms))
+        cost = float(planner.cost_of_terms(terms))
         if math.isfinite(solution.cost) and not math.isnan(cost):
             yield from _unlike({"cost": solution.cost}, {"cost": cost}, f"{name}: ")
     yield from _unlike(log.summary.terms, terms, "last solution: ")

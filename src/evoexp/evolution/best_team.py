@@ -38,10 +38,7 @@ class BestTeam(NamedTuple):
 
 @kernel
 def pair_index(num: int, first: int, second: int) -> int:
-    """Return the place of populations first < second of `num` in the order of pairs.
-
-    The order is (0, 1), (0, 2), …, (1, 2), ….
-    """
+    """Return the place of populations first < second of `num` in the order of pairs."""
     return first * (2 * num - first - 1) // 2 + second - first - 1
 
 

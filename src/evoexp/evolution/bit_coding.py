@@ -43,8 +43,7 @@ def cross_strings(
     """Cut pairs of parents at one site and exchange their tails (Chen & Zalzala 1995, section 3.2).
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability
-    `rate`, before one of the bits 1 … all − 1, each equally likely. A pair that is not cut is
-    copied.
+    `rate`, before one of the bits 1 … all − 1, each equally likely; else it is copied.
     """
     genes, count = len(strings), len(parents)
     # copies of the parents
@@ -66,18 +65,10 @@ def cross_strings(
 
 @kernel
 def flip_strings(draws: Block, strings: IntArray, bits: int, count: int, rate: float) -> None:
-    """Flip every bit with probability p, in place (Holland 1975).
+    """Flip every bit of the first `count` strings with probability p, in place (Holland 1975).
 
     The number of bits that stay before the next flipped one is geometrically distributed, ⌊ln(1 −
-    u) / ln(1 − p)⌋ (Devroye 1986, section X.2); so a uniform number is taken per flipped bit
-    instead of per bit.
-
-    Args:
-        draws: See `evoexp.numeric.random_stream`.
-        strings: (genes, ≥ count), changed.
-        bits: Of a gene.
-        count: Individuals.
-        rate: p, a probability in [0, 1].
+    u) / ln(1 − p)⌋ (Devroye 1986, section X.2); so a uniform number is taken per flipped bit.
     """
     num = len(strings) * bits
     staying, place = log(1.0 - rate), -1  # −inf if every bit is to be flipped: then none stays
@@ -94,11 +85,7 @@ def flip_strings(draws: Block, strings: IntArray, bits: int, count: int, rate: f
 def decode_bits(bits: FloatArray, count: int, limits: FloatArray, out: FloatArray) -> None:
     """Decode plain binary numbers n of B bits, the highest first: l + (h − l) n / (2^B − 1).
 
-    Args:
-        bits: (genes × B, ≥ count) 0.0 or 1.0, gene by gene.
-        count: Individuals.
-        limits: (genes, 2) l and h of each gene.
-        out: (genes, ≥ count), written.
+    From bits (genes × B, ≥ count), 0.0 or 1.0, by limits (genes, 2), to out (genes, ≥ count).
     """
     num = len(bits) // len(out)
     greatest = 0.0

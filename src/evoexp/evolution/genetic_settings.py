@@ -4,7 +4,6 @@ from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
 from evoexp.evolution.operators.operator import Crossover, Mutation, Named, Selection
 from evoexp.validation import Component, Count, NonNegativeCount, Rate
 
@@ -20,21 +19,14 @@ class PopulationSettings(Component):
 
     @model_validator(mode="after")
     def _elites_fit(self) -> Self:
-        if self.num_elites > self.population_size:
-            raise SettingError(
-                "num_elites", f"at most population_size ({self.population_size})", self.num_elites
-            )
+        size = self.population_size
+        self.demand("num_elites", self.num_elites <= size, f"at most population_size ({size})")
         return self
 
     @property
     def num_offspring(self) -> int:
         """Individuals that are new in every generation."""
         return self.population_size - self.num_elites
-
-    @property
-    def num_evaluations(self) -> int:
-        """Evaluations of a whole run: the initial population, then all offspring."""
-        return self.population_size + self.num_generations * self.num_offspring
 
 
 class GeneticSettings(PopulationSettings):

@@ -62,12 +62,9 @@ def choose_collaborator(
 ) -> int:
     """Return the individual of a population with the fewest collisions with a team (P,).
 
-    Args:
-        collisions: See the module.
-        team: (P,) known of population `seed` and of all populations before this one.
-        seed: Population of the member that the team is formed around.
-        population: This one.
-        order: (N,) its individuals, the cheapest first; the first of equals is chosen.
+    The team is known of population `seed`, that of the member it is formed around, and of all
+    before this one. `order` (N,) are the individuals, the cheapest first; the first of equals is
+    chosen.
     """
     num, chosen, fewest = len(team), order[0], -1
     for k in range(len(order)):
@@ -92,14 +89,11 @@ def gather_teams(
     # were formed around: population by population, index by index
     formed: Hall,
 ) -> int:
-    """Give every member of a front its best collaborators, of the first `count` individuals.
+    """Give every member of a front its best collaborators; return how many teams there are.
 
     They are chosen population by population, in order of index: the fewest collisions with all who
     are in the team already, then the lowest own cost, then the lowest index. A team may come up
     several times.
-
-    Returns:
-        How many teams there are.
     """
     (num, count), order, filled = own.shape, sort_by_cost(own), 0
     for p in range(num):
@@ -132,8 +126,7 @@ def renew_hall(
 ) -> int:
     """Choose the next hall: the best of its teams and of those formed around the fronts.
 
-    Returns:
-        Number of teams that the hall holds then.
+    Returns the number of teams that the hall holds then.
     """
     # candidates: the hall's own teams, one per member of a front, the best of all
     most = num_teams + np.count_nonzero(front) + (1 if best[0] >= 0 else 0)
@@ -188,9 +181,9 @@ def is_among(team: IntArray, teams: IntArray, num_teams: int) -> bool:
 def drop_rivals(
     pool: IntArray, team: IntArray, exclusive: BoolArray, left: IntArray, num_left: int
 ) -> int:
-    """Remove the candidates of `pool` that share a member with a team (P,) from `left`, in order.
+    """Remove candidates that share a member with a team (P,) from `left`; return how many stay.
 
-    In populations that are not exclusive members may be shared. Returns how many candidates stay.
+    In populations that are not exclusive members may be shared.
     """
     kept = 0
     for c in range(num_left):

@@ -8,22 +8,14 @@ from evoexp.records import BoolArray, FloatArray
 
 @kernel
 def pareto_front(criteria: FloatArray) -> BoolArray:
-    """Mark the individuals that are not dominated (Curkovic et al. 2013, section 3).
+    """Mark the individuals (individuals,) that are not dominated (Curkovic et al. 2013, section 3).
 
-    One dominates another if it is no worse in every criterion and better in at least one. Exact
-    ties are all kept. An individual with a NaN neither dominates nor is on the front.
+    One dominates another if it is no worse in every criterion (criteria, individuals), all
+    minimised, and better in at least one. Exact ties are all kept. An individual with a NaN neither
+    dominates nor is on the front. ValueError: there is no criterion.
 
     Dominance is transitive, so only those not dominated so far are compared with all. Four criteria
     per pass stay in registers; where fewer are left, the last is repeated, which changes nothing.
-
-    Args:
-        criteria: (criteria, individuals), all minimised; ±inf are allowed.
-
-    Returns:
-        (individuals,) bool.
-
-    Raises:
-        ValueError: If there is no criterion.
     """
     if len(criteria) == 0:
         raise ValueError("criteria are (criteria, individuals), one at least")

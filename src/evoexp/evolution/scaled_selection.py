@@ -2,12 +2,9 @@
 
 Every individual first becomes a parent as often as the whole part of its expected number says. For
 the places left, the remainders are added up once, in random order; an individual that brings the
-sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an individual gets at
-most one of these places, with exactly the probability of its remainder.
-
-Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
-order of indices against individuals that come late, and in any order against small remainders (of
-0.9 and 0.1 the second one gets the place with probability 0.06).
+sum past u, u + 1, u + 2, … gets a place, where u is one uniform number: at most one, with exactly
+the probability of its remainder. Goldberg's scan, which tosses a coin per remainder until the
+places are full, is biased against individuals that come late, and against small remainders.
 """
 
 from typing import NamedTuple
@@ -44,8 +41,7 @@ def choose_parents(
 ) -> bool:
     """Choose the elites, and parents by linear scaling and stochastic remainders.
 
-    Returns:
-        Whether the draws sufficed; if not, no parents are chosen.
+    Returns whether the draws sufficed; if not, no parents are chosen.
     """
     parents, elites, expected, order = memory
     choose_elites(costs, elites)
@@ -63,21 +59,13 @@ def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatA
 
     The paper, after Goldberg (1989), scales a fitness f = C_m − C to f' = a f + b, whose mean is
     that of f and whose maximum is `multiple` times the mean; negative values are set to 0. An
-    individual then expects f' / mean(f') copies:
+    individual then expects f' / mean(f') = 1 + (multiple − 1) (mean(C) − C) / (mean(C) − min(C))
+    copies, whatever C_m is. Setting negative values to 0 raises the mean, and all values are
+    divided by it.
 
-        f' / mean(f) = 1 + (multiple − 1) (mean(C) − C) / (mean(C) − min(C)),
-
-    which does not depend on C_m (nor on the unit of the costs), so C_m is no setting. Setting
-    negative values to 0 raises the mean, and all values are divided by it: the best then expects
-    fewer than `multiple`.
-
-    Args:
-        costs: (individuals,) lower is better; an individual whose cost is not finite expects no
-            copy and is left out of the mean.
-        count: Number of parents.
-        multiple: Copies that the best one expects if there is a parent per individual, > 1 [-].
-        expected: (individuals,) ≥ 0, written; their sum is `count` but for rounding. Individuals of
-            equal finite cost expect equally many copies; without any finite cost all do.
+    Individuals whose cost is not finite expect no copy and are left out of the mean; those of equal
+    finite cost expect equally many; without any finite cost all do. The sum is `count`, but for
+    rounding.
     """
     # mean and least of the finite costs
     num, finite, total, least = len(costs), 0, 0.0, np.inf

@@ -73,11 +73,7 @@ def is_own(path: Path) -> bool:
 
 
 def read_kept(path: Path) -> bytes:
-    """Return the content of a kept file.
-
-    Raises:
-        Damaged: If it is missing, not as it was written, or not this user's.
-    """
+    """Return the content of a kept file; `Damaged`: it is missing, altered, or not this user's."""
     content = b""
     with contextlib.suppress(OSError):
         content = path.read_bytes() if is_own(path) else b""
@@ -87,11 +83,7 @@ def read_kept(path: Path) -> bytes:
 
 
 def write_kept(path: Path, content: bytes) -> None:
-    """Keep a file under a name, whole or not at all.
-
-    Raises:
-        OSError: If that cannot be done.
-    """
+    """Keep a file under a name, whole or not at all; OSError if that cannot be done."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}.tmp")
     try:

@@ -6,7 +6,7 @@ The options keep results bit-identical: no fastmath, no contraction, no reassoci
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import cgutils, types
@@ -14,7 +14,6 @@ from numba.core import cgutils, types
 from evoexp.numeric.kernel_folders import CHECKSUMS, kept_kernels
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Value = TypeVar("Value")
 
 _OPTIONS: dict[str, Any] = {
     "fastmath": False,  # nor contraction, nor reassociation: the same bits on every machine
@@ -47,17 +46,11 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
 class KernelAddress(numba.types.WrapperAddressProtocol):
     """A kernel that other kernels take as an argument, by its address and the types it takes.
 
-    They are compiled once for all kernels of a signature, and kept; were they handed the kernel
-    itself, numba would compile them anew for each, in every process.
+    They are compiled once for all kernels of a signature; handed the kernel itself, once for each.
     """
 
     def __init__(self, function: Callable[..., Any], signature: Any) -> None:
-        """Compile a kernel, or load it.
-
-        Args:
-            function: Decorated by `kernel`.
-            signature: numba's types of its result and its arguments.
-        """
+        """Compile a function decorated by `kernel`, or load it, by numba's types of it."""
         compiled: Any = function
         compiled.compile(signature.args)
         result = compiled.get_compile_result(signature)
@@ -76,15 +69,8 @@ class KernelAddress(numba.types.WrapperAddressProtocol):
         return self._signature
 
 
+# numba's decorator; kernels call such a function without its first argument
 intrinsic: Callable[..., Any] = numba.extending.intrinsic
-"""numba's decorator; kernels call such a function without its first argument."""
-
-
-def _borrow(typing_context: Any, value: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _without_owner(context, builder, value, arguments[0])
-
-    return value(value), generate
 
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
@@ -105,7 +91,15 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-def _view(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
+@intrinsic
+def view_part(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
+    """Return part of a flat contiguous array of eight-byte items, as a view that owns nothing.
+
+    Its arguments: the array, the place of the first item, how many. Nothing is checked. It takes
+    the time of an addition; numba's slices take some 20 ns. An array born in a kernel must be used
+    once more behind the last use of its views.
+    """
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         whole, first, count = arguments
         data = context.make_array(signature.args[0])(context, builder, whole).data
@@ -126,16 +120,14 @@ def _view(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
     return types.Array(array.dtype, 1, "C")(array, types.intp, types.intp), generate
 
 
-view_part: Callable[..., Any] = intrinsic(_view)
-"""Return part of a flat contiguous array of eight-byte items, as a view that owns nothing.
+@intrinsic
+def copy_part(typing_context: Any, source: Any, first: Any, out: Any, at: Any, count: Any) -> Any:
+    """Copy some items of a flat contiguous array into another one of the same type.
 
-Its arguments: the array, the place of the first item, how many. Nothing is checked. It takes the
-time of an addition; numba's slices take some 20 ns. An array born in a kernel must be used once
-more behind the last use of its views.
-"""
-
-
-def _copy(typing_context: Any, source: Any, first: Any, out: Any, at: Any, count: Any) -> Any:
+    Its arguments: the array, the place of the first item, the other array, the place there, how
+    many. No place is checked; the parts must not overlap. A loop that copies some dozen items one
+    by one, or as vectors with a rest, takes several times as long.
+    """
     if {source.layout, out.layout} != {"C"} or source.dtype != out.dtype:
         return None  # numba says that there is no such function
 
@@ -153,24 +145,17 @@ def _copy(typing_context: Any, source: Any, first: Any, out: Any, at: Any, count
     return types.none(source, index, out, index, index), generate
 
 
-copy_part: Callable[..., None] = intrinsic(_copy)
-"""Copy some items of a flat contiguous array into another one of the same type.
+@intrinsic
+def borrowed(typing_context: Any, value: Any) -> Any:
+    """Return arrays, generators, or tuples of them to any depth, as views that own nothing.
 
-Its arguments: the array, the place of the first item, the other array, the place there, how many.
-No place is checked; the parts must not overlap. A loop that copies some dozen items one by one, or
-as vectors with a rest, takes several times as long.
-"""
+    numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and
+    wherever a number is drawn; in a kernel that takes dozens of arrays and calls small `inlined`
+    functions the counting takes most of the time. To be used for arguments only: the caller keeps
+    them alive, while an array born in a kernel is freed where its name is last used.
+    """
 
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _without_owner(context, builder, value, arguments[0])
 
-class _Borrowing(Protocol):
-    def __call__(self, value: Value, /) -> Value: ...
-
-
-borrowed: _Borrowing = intrinsic(_borrow)
-"""Return arrays, generators, or tuples of them to any depth, as views that own nothing.
-
-numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and
-wherever a number is drawn; in a kernel that takes dozens of arrays and calls small `inlined`
-functions the counting takes most of the time. To be used for arguments only: the caller keeps them
-alive, while an array born in a kernel is freed where its name is last used.
-"""
+    return value(value), generate

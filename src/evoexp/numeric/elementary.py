@@ -3,8 +3,8 @@
 The functions are scalar and meant to be called inside kernels: LLVM inlines them, and an innermost
 loop over an array becomes vector code. They use only `+ − × ÷ sqrt`, comparisons and the bits of
 numbers, which IEEE 754 fixes to the last bit: no libm, no fused multiply-add. So scalar and vector
-code, any vector width and any optimisation level give the same bits. `sin`, `cos` and `sincos` take
-vectors (`numeric.vectors`), too. Integer and float32 arguments count as float64. Error bounds are
+code, any vector width and any optimisation level give the same bits. `sincos` takes vectors
+(`numeric.vectors`), too. Integer and float32 arguments count as float64. Error bounds are
 the largest error measured against 80-bit arithmetic, rounded up; u = 1.11e-16 is half a unit in the
 last place of 1.
 
@@ -15,16 +15,13 @@ branches and with short chains of dependent operations.
 """
 
 import math
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vectors import Vector, from_bits, select, to_bits
-
-Number = TypeVar("Number", float, Vector)
-"""An argument of the functions that work on vectors, too."""
+from evoexp.numeric.vectors import Number, from_bits, select, to_bits
 
 DEGREE = 0.017453292519943295  # [rad] one degree
 
@@ -73,8 +70,7 @@ def _sin_polynomial(r: Number) -> Number:
     w = z * z
     p = (_S[1] + z * _S[2]) + w * ((_S[3] + z * _S[4]) + w * _S[5])
     s = r + z * r * (_S[0] + z * p)
-    kept: Number = select(r == 0.0, r, s)  # the sign of zero
-    return kept
+    return select(r == 0.0, r, s)  # the sign of zero
 
 
 @inlined
@@ -91,31 +87,16 @@ def _cos_polynomial(r: Number) -> Number:
 @inlined
 def _quadrant(s: Number, c: Number, n: Any) -> Number:
     """Return sin(r + n π/2) from s = sin r and c = cos r."""
-    turned: Number = from_bits(to_bits(select((n & 1) != 0, c, s)) ^ ((n & 2) << 62))
-    return turned
-
-
-@inlined
-def sin(x: Number) -> Number:
-    """Return the sine of x [rad].
-
-    Absolute error ≤ 1.3e-16 for |x| ≤ 1.6e6; it grows beyond, and past 1e15 the result means
-    nothing. sin(±0) = ±0; NaN for infinities and NaN.
-    """
-    r, n = _reduce(x)
-    return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n)
-
-
-@inlined
-def cos(x: Number) -> Number:
-    """Return the cosine of x [rad]; error and domain as of `sin`."""
-    r, n = _reduce(x)
-    return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n + 1)
+    return from_bits(to_bits(select((n & 1) != 0, c, s)) ^ ((n & 2) << 62))
 
 
 @inlined
 def sincos(x: Number) -> tuple[Number, Number]:
-    """Return (sin x, cos x) of x [rad], the same bits as `sin` and `cos` for the price of one."""
+    """Return (sin x, cos x) of x [rad].
+
+    Absolute error ≤ 1.3e-16 for |x| ≤ 1.6e6; it grows beyond, and past 1e15 the result means
+    nothing. sin(±0) = ±0; NaN for infinities and NaN.
+    """
     r, n = _reduce(x)
     s, c = _sin_polynomial(r), _cos_polynomial(r)
     return _quadrant(s, c, n), _quadrant(s, c, n + 1)
@@ -125,9 +106,8 @@ def sincos(x: Number) -> tuple[Number, Number]:
 def exact_sincos(x: float) -> tuple[float, float]:
     """Return (sin x, cos x) of x [rad], exactly 0 and ±1 where x stands for a multiple of 90°.
 
-    The float64 nearest to π is not π, so `sincos` gives 1.2e-16 for the sine of 180°. Here n times
-    the float64 nearest to π/2, which is also n times 90 times `DEGREE` up to n = 10, counts as n
-    times 90°. All other angles give the bits of `sincos`.
+    The float64 nearest to π is not π. Here n times the float64 nearest to π/2, which is also n
+    times 90 times `DEGREE` up to n = 10, counts as n times 90°; others give the bits of `sincos`.
     """
     s, c = sincos(x)
     t = x * _TWO_OVER_PI + _ROUND
@@ -218,10 +198,7 @@ def _asin_core(x: float) -> tuple[float, float]:
 
 @inlined
 def asin(x: float) -> float:
-    """Return the arcsine of x, an angle in [−π/2, π/2] [rad]; relative error ≤ 3e-16.
-
-    It is NaN for |x| > 1.
-    """
+    """Return the arcsine of x, in [−π/2, π/2] [rad]; relative error ≤ 3e-16; NaN for |x| > 1."""
     x = x * 1.0
     s, excess = _asin_core(x)
     outer = _QUARTER_PI - ((2.0 * excess - 2.0 * _QUARTER_PI_LO) - (_QUARTER_PI - 2.0 * s))
@@ -232,10 +209,7 @@ def asin(x: float) -> float:
 
 @inlined
 def acos(x: float) -> float:
-    """Return the arccosine of x, an angle in [0, π] [rad]; relative error ≤ 2.4e-16.
-
-    It is NaN for |x| > 1.
-    """
+    """Return the arccosine of x, in [0, π] [rad]; relative error ≤ 2.4e-16; NaN for |x| > 1."""
     x = x * 1.0
     s, excess = _asin_core(x)
     inner = 2.0 * _QUARTER_PI - (x - (2.0 * _QUARTER_PI_LO - (-excess if x < 0.0 else excess)))
@@ -356,15 +330,9 @@ def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> 
 def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> NDArray[np.float64]:
     """Draw standard normal deviates by the polar method of Marsaglia & Bray 1964, from `random()`.
 
-    Args:
-        rng: Advanced by 2 uniforms per attempt; an attempt yields a pair of deviates with
-            probability π/4. So n deviates consume no fixed number of uniforms: 1.27 n on average, 2
-            ceil(n/2) at least. Nothing is kept between calls: an odd n discards the second deviate
-            of its last pair.
-        size: Number of deviates, or the shape of the array.
-
-    Returns:
-        Deviates of mean 0 and variance 1  # size [-].
+    An attempt takes 2 uniforms and yields a pair of deviates with probability π/4: n deviates
+    consume no fixed number, 1.27 n on average. An odd n discards the second deviate of its last
+    pair.
     """
     out = np.empty(size)
     with rng.bit_generator.lock:

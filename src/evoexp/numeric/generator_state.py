@@ -9,12 +9,9 @@ STATE_SIZE = 16  # [B] of `state_bytes`: those of the state itself, which come f
 
 
 def state_bytes(bit_generator: Any) -> bytes:
-    """Return the state of a PCG64.
+    """Return the state of a PCG64: state (16), increment (16), has_uint32 (4), uinteger (4) bytes.
 
-    State (16), increment (16), has_uint32 (4), uinteger (4), all little-endian.
-
-    Raises:
-        TypeError: If the generator is no PCG64.
+    All are little-endian. TypeError: the generator is no PCG64.
     """
     demand_pcg64(bit_generator)
     state: Any = bit_generator.state
@@ -30,12 +27,7 @@ def state_bytes(bit_generator: Any) -> bytes:
 
 
 def states_behind(state: bytes, counts: Iterable[int]) -> list[bytes]:
-    """Return the states behind some steps that draw numbers each.
-
-    Args:
-        state: Where the first step begins, see `state_bytes`.
-        counts: Numbers that each step draws.
-    """
+    """Return the states (see `state_bytes`) behind steps that draw `counts` numbers each."""
     number, rest = state[:STATE_SIZE], state[STATE_SIZE:]
     words = [int.from_bytes(part, "little") for part in (number, rest[:STATE_SIZE])]
     generator = np.random.PCG64(0)
@@ -49,10 +41,6 @@ def states_behind(state: bytes, counts: Iterable[int]) -> list[bytes]:
 
 
 def demand_pcg64(bit_generator: Any) -> None:
-    """Refuse other bit generators, whose states have other layouts.
-
-    Raises:
-        TypeError: If it is another one.
-    """
+    """Refuse other bit generators, whose states have other layouts, by a TypeError."""
     if not isinstance(bit_generator, np.random.PCG64):
         raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")

@@ -98,11 +98,7 @@ def _key(packages: frozenset[str]) -> str:
 
 @functools.cache
 def sources_key(package: str = _OWN) -> str:
-    """Return the hash of all sources of a package that kernels can be made of.
-
-    Raises:
-        OSError: If there are none, as for what is typed into an interpreter.
-    """
+    """Return the hash of all sources of a package that kernels can be made of, or OSError."""
     key, _STATES[package] = hashlib.sha256(), _states(package)
     for path, _ in _STATES[package]:
         key.update(f"{path.name}\0".encode())

@@ -11,15 +11,7 @@ FloatArray = NDArray[np.float64]
 
 
 def matrix_product(one: FloatArray, two: FloatArray) -> FloatArray:
-    """Return the matrix product of two arrays.
-
-    Args:
-        one: (…, k).
-        two: (k,) or (k, m).
-
-    Returns:
-        (…) or (…, m).
-    """
+    """Return the matrix product of (…, k) and (k,) or (k, m)."""
     columns = one if two.ndim == 1 else one[..., None]
     axis = one.ndim - 1
     total = columns.take(0, axis) * two[0]

@@ -8,12 +8,8 @@ Coefficients: the polynomials in t² that take the values of sin(t π/2) / t and
 Chebyshev's nodes of [0, 0.2505].
 """
 
-from typing import TypeVar
-
 from evoexp.numeric.compilation import inlined
-from evoexp.numeric.vectors import Vector, from_bits, select, to_bits
-
-Number = TypeVar("Number", float, Vector)
+from evoexp.numeric.vectors import Number, from_bits, select, to_bits
 
 QUARTER_TURN = 1.5707963267948966  # [rad]
 
@@ -39,6 +35,5 @@ def sincos_of_turn(t: Number) -> tuple[Number, Number]:
     c = _C[0] + z * (_C[1] + z * (_C[2] + z * (_C[3] + z * (_C[4] + z * _C[5]))))
     c = 1.0 + z * c
     odd = (n & 1) != 0
-    sine: Number = from_bits(to_bits(select(odd, c, s)) ^ ((n & 2) << 62))
-    cosine: Number = from_bits(to_bits(select(odd, s, c)) ^ (((n + 1) & 2) << 62))
-    return sine, cosine
+    sine = from_bits(to_bits(select(odd, c, s)) ^ ((n & 2) << 62))
+    return sine, from_bits(to_bits(select(odd, s, c)) ^ (((n + 1) & 2) << 62))

@@ -22,18 +22,10 @@ class Block(NamedTuple):
 
 
 class Draws:
-    """The blocks of one run, each drawn when the last one is used up, into the same memory.
-
-    Attributes:
-        block: The block that kernels take numbers of; valid until the next one.
-    """
+    """The blocks of one run, each drawn into the same memory when the last one is used up."""
 
     def __init__(self, least: int) -> None:
-        """Start with an empty block.
-
-        Args:
-            least: Numbers that are drawn at once, at least.
-        """
+        """Start with an empty block; at least `least` numbers are drawn at once."""
         self._least, self._memory = least, np.empty(0)
         self.block = Block(self._memory, np.zeros(1, dtype=np.int64))
 
@@ -53,12 +45,7 @@ class DrawnAhead:
     """Uniform numbers for several steps at once; what they leave is for the next steps."""
 
     def __init__(self, rng: np.random.Generator, most: int) -> None:
-        """Begin where a generator is.
-
-        Args:
-            rng: The generator, a PCG64.
-            most: Numbers that a step takes at most, as far as the caller knows.
-        """
+        """Begin where a PCG64 is; a step takes `most` numbers, as far as the caller knows."""
         self._rng, self._most, self._left = rng, most, np.empty(0)
         self._state = state_bytes(rng.bit_generator)
 
@@ -71,11 +58,7 @@ class DrawnAhead:
         return self._left
 
     def take(self, counts: list[int]) -> list[bytes]:
-        """Tell how many of these numbers each of the steps took.
-
-        Returns:
-            The states that the generator would have had behind each step.
-        """
+        """Tell how many numbers each step took; return the states that lie behind each of them."""
         self._left = self._left[sum(counts) :]
         states = states_behind(self._state, counts)
         self._state = states[-1]

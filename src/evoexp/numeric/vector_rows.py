@@ -6,18 +6,16 @@ stands side by side, and is read by one load per lane and a few shuffles (`load_
 `load_quads`), a fraction of the cost of a load per number.
 """
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, TypeAlias
 
-import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.errors import TypingError
-from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import intrinsic
-from evoexp.numeric.vectors import LANES, Vector, vector_type
+from evoexp.numeric.vectors import LANES, vector_type
 
+Eight: TypeAlias = Any  # a tuple of eight vectors
 _INDEX = ir.IntType(32)
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
 
@@ -48,7 +46,9 @@ def _interleaved(builder: Any, rows: list[Any], width: int) -> list[Any]:
 
 
 @intrinsic
-def _transpose(typing_context: Any, rows: Any) -> Any:
+def transposed(typing_context: Any, rows: Any) -> Any:
+    """Return eight vectors as rows of a square, transposed: lane j of row i: lane i of row j."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values = [builder.extract_value(arguments[0], k) for k in range(LANES)]
         for width in (1, 2, 4):
@@ -71,7 +71,11 @@ def _addresses(context: Any, builder: Any, signature: Any, arguments: Any) -> It
 
 
 def _columns(width: int) -> Any:
-    """Return a function for kernels that reads `width` numbers for each lane, as vectors."""
+    """Return a function for kernels that reads `width` numbers for each lane, as vectors.
+
+    Its arguments: a contiguous array (whether the numbers lie within it is not checked), an array
+    of places, one per lane, from an index on, that index, and an offset from all places.
+    """
 
     @intrinsic
     def read(typing_context: Any, array: Any, places: Any, at: Any, offset: Any) -> Any:
@@ -81,9 +85,11 @@ def _columns(width: int) -> Any:
                 value = builder.load(builder.bitcast(address, part.as_pointer()))
                 value.align = 8  # [B] that of a float64
                 parts.append(value)
-            return context.make_tuple(builder, signature.return_type, _joined(builder, parts))
+            rows = _joined(builder, parts)
+            whole = signature.return_type
+            return rows[0] if width == 1 else context.make_tuple(builder, whole, rows)
 
-        result = types.UniTuple(vector_type, width)
+        result = vector_type if width == 1 else types.UniTuple(vector_type, width)
         return result(array, places, types.uint64, types.uint64), generate
 
     return read
@@ -108,26 +114,18 @@ def _joined(builder: Any, parts: list[Any]) -> list[Any]:
     return rows
 
 
-@intrinsic
-def _load_each(typing_context: Any, array: Any, places: Any, at: Any, offset: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        row = ir.Constant(_DOUBLES, ir.Undefined)
-        for lane, address in enumerate(_addresses(context, builder, signature, arguments)):
-            row = builder.insert_element(row, builder.load(address), ir.Constant(_INDEX, lane))
-        return row
-
-    return vector_type(array, places, types.uint64, types.uint64), generate
+load_each, load_pairs, load_quads = map(_columns, (1, 2, 4))
 
 
 @intrinsic
-def _count(
-    typing_context: Any, array: Any, places: Any, at: Any, offset: Any, limits: Any, num: Any
+def num_up_to(
+    typing_context: Any, array: Any, places: Any, at: Any, offset: Any, limits: Any
 ) -> Any:
-    if not isinstance(num, types.IntegerLiteral):  # numba then asks again with its value
-        raise TypingError("num must be a constant")
-    # the bits of the numbers that count, of every lane
-    last = (0xFF << (LANES - num.literal_value)) & 0xFF
-    counted = int.from_bytes(bytes([last] * LANES), "little")
+    """Return how many of the last seven of eight numbers are not above each lane's limit.
+
+    The arguments before the limits are those of `load_pairs`.
+    """
+    counted = int.from_bytes(bytes([0xFE] * LANES), "little")  # bits that count, of every lane
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         limits, masks = arguments[4], []
@@ -153,11 +151,13 @@ def _count(
         wide = builder.call(ones, [builder.zext(narrow, words)])
         return builder.sitofp(wide, _DOUBLES)
 
-    return vector_type(array, places, types.uint64, types.uint64, vector_type, num), generate
+    return vector_type(array, places, types.uint64, types.uint64, vector_type), generate
 
 
 @intrinsic
-def _number_lanes(typing_context: Any) -> Any:
+def lane_numbers(typing_context: Any) -> Any:
+    """Return 0, 1, … 7."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return ir.Constant(_DOUBLES, [float(lane) for lane in range(LANES)])
 
@@ -165,7 +165,9 @@ def _number_lanes(typing_context: Any) -> Any:
 
 
 @intrinsic
-def _store_places(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
+def store_places(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
+    """Write eight whole numbers, not negative, as places into an array, from an index on."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         words = ir.VectorType(ir.IntType(64), LANES)
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -175,49 +177,3 @@ def _store_places(typing_context: Any, array: Any, place: Any, vector: Any) -> A
         return context.get_dummy_value()
 
     return types.void(array, types.uint64, vector_type), generate
-
-
-Eight = tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]
-FloatArray = NDArray[np.float64]
-Places = NDArray[np.uint64]
-
-transposed: Callable[[Eight], Eight] = _transpose
-"""Return eight vectors as rows of a square, transposed: lane j of row i becomes lane i of row j."""
-
-load_each: Callable[[FloatArray, Places, np.uint64, np.uint64], Vector] = _load_each
-"""Return the number that stands at an offset from each lane's place; see `load_pairs`."""
-
-load_pairs: Callable[[FloatArray, Places, np.uint64, np.uint64], tuple[Vector, Vector]] = _columns(
-    2
-)
-"""Return the two numbers that stand at an offset from each lane's place, as two vectors.
-
-Args:
-    array: Contiguous; whether the numbers lie within it is not checked.
-    places: One per lane, from an index on.
-    at: That index.
-    offset: Added to all places.
-"""
-
-load_quads: Callable[
-    [FloatArray, Places, np.uint64, np.uint64], tuple[Vector, Vector, Vector, Vector]
-] = _columns(4)
-"""Return four numbers per lane as four vectors; see `load_pairs`."""
-
-num_up_to: Callable[[FloatArray, Places, np.uint64, np.uint64, Vector, int], Vector] = _count
-"""Return how many of eight numbers at an offset from each lane's place are not above its limit.
-
-Args:
-    array: See `load_pairs`.
-    places: See `load_pairs`.
-    at: See `load_pairs`.
-    offset: See `load_pairs`.
-    limits: One per lane.
-    num: How many of the eight are looked at, the last ones; a constant.
-"""
-
-store_places: Callable[[Places, np.uint64, Vector], None] = _store_places
-"""Write eight whole numbers, not negative, as places into an array, from an index on."""
-
-lane_numbers: Callable[[], Vector] = _number_lanes
-"""Return 0, 1, … 7."""

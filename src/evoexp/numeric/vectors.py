@@ -12,44 +12,24 @@ written with them serves both.
 
 import operator
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
-import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.errors import TypingError
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
-from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import inlined, intrinsic
 
 LANES = 8
 
 
-class Mask(Protocol):
-    """Eight truth values, of a comparison of vectors."""
-
-    def __and__(self, other: "Mask | bool") -> "Mask": ...
-    def __or__(self, other: "Mask") -> "Mask": ...
-
-
-class Vector(Protocol):
-    """Eight float64. This is their type for annotations; in kernels it is `vector_type`."""
-
-    def __add__(self, other: "Vector | float") -> "Vector": ...
-    def __radd__(self, other: float) -> "Vector": ...
-    def __sub__(self, other: "Vector | float") -> "Vector": ...
-    def __rsub__(self, other: float) -> "Vector": ...
-    def __mul__(self, other: "Vector | float") -> "Vector": ...
-    def __rmul__(self, other: float) -> "Vector": ...
-    def __truediv__(self, other: "Vector | float") -> "Vector": ...
-    def __rtruediv__(self, other: float) -> "Vector": ...
-    def __lt__(self, other: "Vector | float") -> Mask: ...
-    def __le__(self, other: "Vector | float") -> Mask: ...
-    def __eq__(self, other: "Vector | float") -> Mask: ...  # type: ignore[override]
-    def __gt__(self, other: "Vector | float") -> Mask: ...
-    def __ge__(self, other: "Vector | float") -> Mask: ...
+# eight float64, and eight truth values of a comparison: numba knows them as `vector_type` and
+# `mask_type`, and checks their use when it compiles a kernel; a `Number` is a float or a vector
+Vector: TypeAlias = Any
+Mask: TypeAlias = Any
+Number: TypeAlias = Any
 
 
 class _VectorType(types.Type):
@@ -110,7 +90,7 @@ def _define(
         lower_builtin(operation, *pair)(generate)
 
 
-def _comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
+def _compare(sign: str) -> Callable[[Any, Any, Any], Any]:
     return lambda builder, one, two: builder.fcmp_ordered(sign, one, two)
 
 
@@ -118,31 +98,28 @@ def _unequal(builder: Any, one: Any, two: Any) -> Any:
     return builder.icmp_signed("!=", one, two)
 
 
-for _operation, _instruction in {
-    operator.add: ir.IRBuilder.fadd,
-    operator.sub: ir.IRBuilder.fsub,
-    operator.mul: ir.IRBuilder.fmul,
-    operator.truediv: ir.IRBuilder.fdiv,
-}.items():
-    _define(_operation, vector_type, types.float64, vector_type, _instruction)
-for _operation, _instruction in {
-    operator.add: ir.IRBuilder.add,
-    operator.and_: ir.IRBuilder.and_,
-    operator.xor: ir.IRBuilder.xor,
-    operator.lshift: ir.IRBuilder.shl,
-}.items():
-    _define(_operation, word_type, types.int64, word_type, _instruction)
-for _sign, _operation in {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-}.items():
-    _define(_operation, vector_type, types.float64, mask_type, _comparison(_sign))
-_define(operator.ne, word_type, types.int64, mask_type, _unequal)
-_define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
-_define(operator.or_, mask_type, types.boolean, mask_type, ir.IRBuilder.or_)
+_of_numbers = vector_type, types.float64
+_of_words = word_type, types.int64
+_of_flags = mask_type, types.boolean
+for _operation, _kinds, _result, _instruction in (
+    (operator.add, _of_numbers, vector_type, ir.IRBuilder.fadd),
+    (operator.sub, _of_numbers, vector_type, ir.IRBuilder.fsub),
+    (operator.mul, _of_numbers, vector_type, ir.IRBuilder.fmul),
+    (operator.truediv, _of_numbers, vector_type, ir.IRBuilder.fdiv),
+    (operator.lt, _of_numbers, mask_type, _compare("<")),
+    (operator.le, _of_numbers, mask_type, _compare("<=")),
+    (operator.gt, _of_numbers, mask_type, _compare(">")),
+    (operator.ge, _of_numbers, mask_type, _compare(">=")),
+    (operator.eq, _of_numbers, mask_type, _compare("==")),
+    (operator.add, _of_words, word_type, ir.IRBuilder.add),
+    (operator.and_, _of_words, word_type, ir.IRBuilder.and_),
+    (operator.xor, _of_words, word_type, ir.IRBuilder.xor),
+    (operator.lshift, _of_words, word_type, ir.IRBuilder.shl),
+    (operator.ne, _of_words, mask_type, _unequal),
+    (operator.and_, _of_flags, mask_type, ir.IRBuilder.and_),
+    (operator.or_, _of_flags, mask_type, ir.IRBuilder.or_),
+):
+    _define(_operation, _kinds[0], _kinds[1], _result, _instruction)
 
 
 def _check_array(array: Any) -> None:
@@ -158,7 +135,11 @@ def _pointer(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> A
 
 
 @intrinsic
-def _load(typing_context: Any, array: Any, place: Any) -> Any:
+def load(typing_context: Any, array: Any, place: Any) -> Any:
+    """Return eight numbers that stand side by side in a contiguous array, from an index on.
+
+    Neither `load` nor `store` checks that they lie within the array.
+    """
     _check_array(array)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -170,7 +151,8 @@ def _load(typing_context: Any, array: Any, place: Any) -> Any:
 
 
 @intrinsic
-def _store(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
+def store(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
+    """Write eight numbers side by side into a contiguous array, from an index on."""
     _check_array(array)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -183,7 +165,9 @@ def _store(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
 
 
 @intrinsic
-def _spread_scalar(typing_context: Any, value: Any) -> Any:
+def spread(typing_context: Any, value: Any) -> Any:
+    """Return a vector of one number in every lane."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return _spread(builder, arguments[0], vector_type)
 
@@ -191,7 +175,9 @@ def _spread_scalar(typing_context: Any, value: Any) -> Any:
 
 
 @intrinsic
-def _select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
+def select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
+    """Return the first value in lanes where a condition holds, the second in the others."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.select(*arguments)
 
@@ -200,11 +186,16 @@ def _select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
 
 @intrinsic
 def _any_lane(typing_context: Any, mask: Any) -> Any:
+    """Return whether a condition holds in any lane."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = builder.bitcast(arguments[0], ir.IntType(LANES))
         return builder.icmp_unsigned("!=", word, ir.Constant(word.type, 0))
 
     return types.boolean(mask_type), generate
+
+
+any_lane: Callable[[Mask], bool] = _any_lane
 
 
 def _of_llvm(name: str) -> Any:
@@ -213,10 +204,9 @@ def _of_llvm(name: str) -> Any:
     @intrinsic
     def operation(typing_context: Any, vector: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
             function = cgutils.get_or_insert_function(
-                builder.module,
-                ir.FunctionType(_DOUBLES, [_DOUBLES]),
-                f"llvm.{name}.v{LANES}f64",
+                builder.module, kind, f"llvm.{name}.v{LANES}f64"
             )
             return builder.call(function, arguments)
 
@@ -240,56 +230,21 @@ def _reinterpretation(targets: dict[Any, Any]) -> Any:
     return reinterpret
 
 
-load: Callable[[NDArray[np.float64], np.uint64], Vector] = _load
-"""Return eight numbers that stand side by side in a contiguous array, from an index on.
-
-Neither `load` nor `store` checks that they lie within the array.
-"""
-
-store: Callable[[NDArray[np.float64], np.uint64, Vector], None] = _store
-"""Write eight numbers side by side into a contiguous array, from an index on."""
-
-spread: Callable[[float], Vector] = _spread_scalar
-"""Return a vector of one number in every lane."""
-
-select: Callable[[Any, Any, Any], Any] = _select
-"""Return the first value in lanes where a condition holds, the second in the others."""
-
-any_lane: Callable[[Mask], bool] = _any_lane
-"""Return whether a condition holds in any lane."""
-
-root: Callable[[Vector], Vector] = _of_llvm("sqrt")
-"""Return the square root of every lane, correctly rounded."""
-
-magnitude: Callable[[Vector], Vector] = _of_llvm("fabs")
-"""Return the absolute value of every lane."""
-
-ceiling: Callable[[Vector], Vector] = _of_llvm("ceil")
-"""Return the least whole number not below the value of every lane."""
-
-whole: Callable[[Vector], Vector] = _of_llvm("rint")
-"""Return the whole number that is nearest to the value of every lane, the even one of two."""
-
-to_bits: Callable[[Any], Any] = _reinterpretation(
-    {types.float64: types.int64, vector_type: word_type}
-)
-"""Return the bits of a float64 as an int64, of a vector as eight of them."""
-
-from_bits: Callable[[Any], Any] = _reinterpretation(
-    {types.int64: types.float64, word_type: vector_type}
-)
-"""Undo `to_bits`."""
+# of every lane: the square root, correctly rounded; the absolute value; the least whole number not
+# below; the nearest whole number, the even one of two
+root, magnitude, ceiling, whole = map(_of_llvm, ("sqrt", "fabs", "ceil", "rint"))
+# the bits of a float64 as an int64, of a vector as eight of them; and back
+to_bits = _reinterpretation({types.float64: types.int64, vector_type: word_type})
+from_bits = _reinterpretation({types.int64: types.float64, word_type: vector_type})
 
 
 @inlined
 def lower(one: Vector, two: Vector) -> Vector:
     """Return the smaller of two numbers, lane by lane; the first where either is NaN."""
-    found: Vector = select(two < one, two, one)
-    return found
+    return select(two < one, two, one)
 
 
 @inlined
 def upper(one: Vector, two: Vector) -> Vector:
     """Return the greater of two numbers, lane by lane; the first where either is NaN."""
-    found: Vector = select(one < two, two, one)
-    return found
+    return select(one < two, two, one)

@@ -4,7 +4,6 @@ from typing import ClassVar, Self
 
 from pydantic import model_validator
 
-from evoexp.errors import SettingError
 from evoexp.validation import Component, NonNegative
 
 
@@ -18,10 +17,8 @@ class PathCost(Component):
 
     @model_validator(mode="after")
     def _something_costs(self) -> Self:
-        if self.distance_weight == 0.0 and self.unsafeness_weight == 0.0:
-            raise SettingError(
-                "distance_weight", "above 0, or unsafeness_weight is: else all paths cost 0", 0.0
-            )
+        must = "above 0, or unsafeness_weight is: else all paths cost 0"
+        self.demand("distance_weight", any(self.weights), must)
         return self
 
     @property

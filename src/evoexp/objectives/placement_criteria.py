@@ -38,16 +38,12 @@ class PlacementCriteria(Component):
     @model_validator(mode="after")
     def _something_is_asked_for(self) -> Self:
         weights = self.torque_norm_weight, self.torque_max_weight, self.manipulability_weight
-        if not any((*weights, *(one.weight for one in self.avoidances))):
-            raise SettingError(
-                "torque_norm_weight",
-                "above 0, or another weight: with all of them 0 every posture costs the same",
-                self.torque_norm_weight,
-            )
+        counts = any((*weights, *(one.weight for one in self.avoidances)))
+        must = "above 0, or another weight: with all of them 0 every posture costs the same"
+        self.demand("torque_norm_weight", counts, must)
         if self.torque_max_weight > 0.0 and not any(self.torque_weights):
-            raise SettingError(
-                "torque_weights", "above 0 for one torque at least", list(self.torque_weights)
-            )
+            must = "above 0 for one torque at least"
+            raise SettingError("torque_weights", must, list(self.torque_weights))
         return self
 
     @property
@@ -57,21 +53,14 @@ class PlacementCriteria(Component):
         return Weights(*plain, *self.torque_weights, self.greatest)
 
     def avoided(self, obstacles: FloatArray) -> FloatArray:
-        """Return the terms of Eq. 12 as a table for the kernels, (n, 5).
+        """Return the terms of Eq. 12 as a table for the kernels, (n, 5), by the obstacles' middles.
 
-        Args:
-            obstacles: (obstacles, 2) their middles.
-
-        Raises:
-            SettingError: If there is no such obstacle.
+        SettingError: there is no such obstacle.
         """
         rows = []
         for k, one in enumerate(self.avoidances):
             if one.obstacle >= len(obstacles):
-                raise SettingError(
-                    f"objective.avoidances[{k}].obstacle",
-                    f"an obstacle of the scenario, which has {len(obstacles)} (counted from 0)",
-                    one.obstacle,
-                )
+                must = f"an obstacle of the scenario, which has {len(obstacles)} (counted from 0)"
+                raise SettingError(f"objective.avoidances[{k}].obstacle", must, one.obstacle)
             rows.append([one.weight, one.link, one.place, *obstacles[one.obstacle]])
         return np.array(rows, dtype=np.float64).reshape(len(rows), 5)

@@ -54,13 +54,9 @@ class Model(NamedTuple):
     limits: FloatArray  # (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3
 
     def measure(self, angles: FloatArray) -> FloatArray:
-        """Return criteria and branch of postures θ1, θ2 (2, individuals) [deg].
+        """Return criteria and branch (CRITERIA + 1, individuals) of θ1, θ2 (2, individuals) [deg].
 
-        Returns:
-            (CRITERIA + 1, individuals).
-
-        Raises:
-            ValueError: If the angles have another shape.
+        ValueError: the angles have another shape.
         """
         angles = np.ascontiguousarray(angles, dtype=np.float64)
         if angles.ndim != 2 or len(angles) != 2:
@@ -70,11 +66,7 @@ class Model(NamedTuple):
         return out
 
     def measure_branches(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return E and θ3 [deg] of both branches of postures θ1, θ2 (2, individuals) [deg].
-
-        Returns:
-            Two arrays (2, individuals), by branch.
-        """
+        """Return E and θ3 [deg] by branch, both (2, individuals), of θ1, θ2 (2, …) [deg]."""
         angles = np.ascontiguousarray(angles, dtype=np.float64)
         branches, _ = measure_branches(angles, angles.shape[1], self)
         return branches[:, COST], branches[:, THETA_3]
@@ -99,14 +91,10 @@ def _inverse(value: float, cap: float) -> float:
 
 @kernel
 def measure_branches(angles: FloatArray, count: int, model: Model) -> tuple[FloatArray, BoolArray]:
-    """Measure both values of θ3 of every posture.
+    """Measure both values of θ3 of every posture θ1, θ2 (2, ≥ count) [deg].
 
-    Args:
-        angles: (2, ≥ count) θ1, θ2 [deg].
-
-    Returns:
-        (2, RESULTS, count) by branch: the criteria, torques, θ3 [deg] and X_p, which are NaN out of
-        reach; and (2, count) whether each is feasible: reachable, and within the limits.
+    Returns by branch (2, RESULTS, count): the criteria, torques, θ3 [deg] and X_p, which are NaN
+    out of reach; and (2, count) whether each is feasible: reachable, and within the limits.
     """
     task, links = model.task, np.empty((7, count))
     for k in range(count):

@@ -104,20 +104,14 @@ class PostureCost(Component):
 
     @model_validator(mode="after")
     def _terms_agree(self) -> Self:
-        if self.goal_distance is None:
-            raise SettingError("goal_distance", "given: every goal is a place", None)
+        must = "given: every goal is a place"
+        self.demand("goal_distance", self.goal_distance is not None, must)
         if self.upright is not None and self.keep_parallel is not None:
-            raise SettingError(
-                "keep_parallel",
-                "left out with upright, which holds another axis of the same frame",
-                self.keep_parallel.weight,
-            )
+            must = "left out with upright, which holds another axis of the same frame"
+            raise SettingError("keep_parallel", must, self.keep_parallel.weight)
         if self.free_space is not None and self.collision is None:
-            raise SettingError(
-                "free_space",
-                "given with collision, whose distances it rates",
-                self.free_space.weight,
-            )
+            must = "given with collision, whose distances it rates"
+            raise SettingError("free_space", must, self.free_space.weight)
         return self
 
     @property
@@ -137,15 +131,11 @@ class PostureCost(Component):
         """
         for k, name in enumerate(terms):
             if name not in TERMS:
-                raise SettingError(
-                    f"{field}[{k}]", f"a cost term ({', '.join(TERMS)})", name, nearest(name, TERMS)
-                )
+                must = f"a cost term ({', '.join(TERMS)})"
+                raise SettingError(f"{field}[{k}]", must, name, nearest(name, TERMS))
             if name not in self.chosen:
-                raise SettingError(
-                    f"{field}[{k}]",
-                    f"a term that the objective gives a weight ({', '.join(self.chosen)})",
-                    name,
-                )
+                must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
+                raise SettingError(f"{field}[{k}]", must, name)
         counting = terms or self.chosen
         given = [getattr(self, name) if name in counting else None for name in TERMS]
         weights = [term.weight if term else 0.0 for term in given]

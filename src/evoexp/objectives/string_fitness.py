@@ -64,12 +64,9 @@ def weigh(
 
 @kernel
 def count_collisions(clearance: FloatArray, collisions: FloatArray) -> None:
-    """Count the instants at which each individual collides (Eq. 6).
+    """Count the instants at which each individual collides (Eq. 6), (lanes,).
 
-    Args:
-        clearance: (kinds, instants, substeps, lanes) clearances; an instant collides if any of its
-            substeps has any negative one.
-        collisions: (lanes,), written.
+    Clearances are (kinds, instants, substeps, lanes): one negative one of an instant is enough.
     """
     kinds, instants, substeps, lanes = clearance.shape
     hit = np.empty(lanes)

@@ -11,8 +11,7 @@ never falls where a path turns on the spot. The origin of L is arbitrary (not ze
 import numpy as np
 
 from evoexp.numeric.compilation import inlined
-from evoexp.numeric.vector_rows import Eight
-from evoexp.numeric.vectors import Vector, load, root, select, spread, store
+from evoexp.numeric.vectors import LANES, Vector, load, select, spread, store
 from evoexp.paths.spline import (
     PAIR,
     load_eight,
@@ -21,7 +20,6 @@ from evoexp.paths.spline import (
     speed_of_all,
     speed_of_two,
     square_speed,
-    store_eight,
     store_rows,
 )
 from evoexp.paths.workspace import EIGHT, U0, U1, U2, VECTOR, Layout
@@ -33,44 +31,7 @@ def between(v0: Vector, v1: Vector, v2: Vector, v3: Vector) -> Vector:
     """Return 24/h times the length between the samples 1 and 2 of four speeds."""
     inner = v1 + v2
     length = 13.0 * inner - (v0 + v3)
-    found: Vector = select(inner < length, length, inner)
-    return found
-
-
-@inlined
-def speeds_of_two(w: FloatArray, knot: np.uint64, at: Layout, u: float, h: float) -> Eight:
-    """Return the speeds of an arm of two joints at eight samples from u on, h apart."""
-    x, y = slope(w, knot), slope(w, knot + at.joint * VECTOR)
-    # where a segment begins only b0 counts
-    first = root(x[0] * x[0] + y[0] * y[0]) if u == 0.0 else speed_of_two(x, y, u)
-    return (
-        first,
-        speed_of_two(x, y, u + h),
-        speed_of_two(x, y, u + 2.0 * h),
-        speed_of_two(x, y, u + 3.0 * h),
-        speed_of_two(x, y, u + 4.0 * h),
-        speed_of_two(x, y, u + 5.0 * h),
-        speed_of_two(x, y, u + 6.0 * h),
-        speed_of_two(x, y, u + 7.0 * h),
-    )
-
-
-@inlined
-def speeds_of_all(
-    w: FloatArray, knot: np.uint64, joints: np.uint64, at: Layout, u: float, h: float
-) -> Eight:
-    """Return the speeds of an arm of any number of joints, as `speeds_of_two`."""
-    q = square_speed(w, knot, joints, at)
-    return (
-        speed_of_all(q, u),
-        speed_of_all(q, u + h),
-        speed_of_all(q, u + 2.0 * h),
-        speed_of_all(q, u + 3.0 * h),
-        speed_of_all(q, u + 4.0 * h),
-        speed_of_all(q, u + 5.0 * h),
-        speed_of_all(q, u + 6.0 * h),
-        speed_of_all(q, u + 7.0 * h),
-    )
+    return select(inner < length, length, inner)
 
 
 @inlined
@@ -91,23 +52,26 @@ def write_speeds(
         p1, p2 = load(w, ahead - VECTOR), load(w, ahead - U2 * VECTOR)
         store(w, ahead, v)
         store(w, ahead + VECTOR, 3.0 * (v - p1) + p2)
-    elif joints == U2:
-        store_eight(w, ahead, speeds_of_two(w, segment * PAIR, at, u, h))
+        return
+    knot = segment * PAIR
+    if joints == U2:
+        x, y = slope(w, knot), slope(w, knot + at.joint * VECTOR)
+        for k in range(LANES):
+            store(w, ahead + np.uint64(k) * VECTOR, speed_of_two(x, y, u + k * h))
     else:
-        store_eight(w, ahead, speeds_of_all(w, segment * PAIR, joints, at, u, h))
+        q = square_speed(w, knot, joints, at)
+        for k in range(LANES):
+            store(w, ahead + np.uint64(k) * VECTOR, speed_of_all(q, u + k * h))
 
 
 @inlined
 def integrate_speed(
     w: FloatArray, joints: np.uint64, N: np.uint64, S: np.uint64, at: Layout
 ) -> tuple[Vector, Vector]:
-    """Write the speeds and lengths of all samples of eight paths; see `workspace`.
+    """Write speeds and lengths of all samples of eight paths; return the first and last length.
 
     The speeds of a block of eight samples are on their way, in the processor's one unit for roots,
     while the lengths of the block before are summed.
-
-    Returns:
-        Lengths up to the first sample and to the last one.
     """
     nothing, h = spread(0.0), 1.0 / np.float64(S)
     here = at.speeds

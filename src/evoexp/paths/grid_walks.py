@@ -105,13 +105,7 @@ def walk(
 
 @kernel
 def follow_exits(exits: NodeArray, ends: tuple[int, int], path: NodeArray) -> None:
-    """Write a walk without its loops: every node's last exit leads on (Wilson 1996).
-
-    Args:
-        exits: (nodes,) the node to which the walk last went from each.
-        ends: Its first node and its last.
-        path: Written.
-    """
+    """Write a walk without its loops: every node's last exit (nodes,) leads on (Wilson 1996)."""
     node, target, count = np.uint64(ends[0]), np.uint64(ends[1]), 1
     path[1] = node
     while node != target:
@@ -186,13 +180,9 @@ def walk_all(
 
 @kernel
 def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
-    """Write a path without its loops: the nodes between two visits of a node are left out.
+    """Write a path of `count` nodes, from index 1 on, without its loops; it may be `path` itself.
 
-    Args:
-        nodes: (≥ count + 1,) a path, its nodes from index 1 on; may be `path` itself.
-        count: Number of its nodes.
-        path: (≥ nodes + 1,), written, its number of nodes first.
-        place: (nodes,) scratch.
+    The nodes between two visits of a node are left out.
     """
     for k in range(1, count + 1):
         place[nodes[k]] = k
@@ -207,16 +197,9 @@ def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray)
 
 @kernel
 def measure_path(path: NodeArray, kinds: NodeArray, unsafeness: FloatArray) -> tuple[float, float]:
-    """Return length and mean unsafeness of a path (Chen & Zalzala 1995, Eqs. 2 and 3).
+    """Return length D [cell] and mean unsafeness S of a path (Chen & Zalzala 1995, Eqs. 2 and 3).
 
-    Moves of each kind are counted, so the length does not depend on their order.
-
-    Args:
-        kinds: See `grids.Grid`.
-        unsafeness: (nodes,).
-
-    Returns:
-        D [cell] and S [-].
+    Moves of each kind (see `grids.Grid`) are counted, so the length does not depend on their order.
     """
     count = path[0]
     diagonal, spatial = 0, 0

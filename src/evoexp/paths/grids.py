@@ -67,16 +67,11 @@ class Moves(NamedTuple):
 def grid(blocked: BoolArray) -> Grid:
     """Return a grid with its permitted moves.
 
-    A diagonal move is permitted if its two nodes are also joined by lateral moves within the box
-    that they span: in the plane it is forbidden between two blocked nodes only ("It is not
-    permissible for the robot to pass between the corners of obstacle regions", Chen & Zalzala 1995,
-    section 2.1), and may touch the corner of one.
-
-    Args:
-        blocked: (nodes along x, along y[, along z]), true for a node of an obstacle.
-
-    Raises:
-        ValueError: If it has another number of dimensions than two or three.
+    `blocked` (nodes along x, along y[, along z]) is true for a node of an obstacle. A diagonal move
+    is permitted if its two nodes are also joined by lateral moves within the box that they span:
+    "It is not permissible for the robot to pass between the corners of obstacle regions" (Chen &
+    Zalzala 1995, section 2.1), and it may touch the corner of one. ValueError: not two or three
+    dimensions.
     """
     dimensions = blocked.ndim
     if dimensions not in (2, 3):
@@ -85,49 +80,39 @@ def grid(blocked: BoolArray) -> Grid:
         itertools.product((-1, 0, 1), repeat=dimensions), key=lambda move: sum(map(abs, move))
     )[1:]
     free = np.pad(~blocked.astype(bool), 1)
-    nodes = np.arange(free.size).reshape(free.shape)
-    neighbours = np.full((*free.shape, len(moves)), -1, dtype=np.int32)
-    inside: tuple[Any, ...] = (slice(1, -1),) * dimensions
-    kinds = np.zeros(
-        int(np.abs(nodes[inside] - _shifted(nodes, (1,) * dimensions)).max()) + 1, dtype=np.int32
-    )
-    for k, move in enumerate(moves):
-        neighbours[(*inside, k)] = np.where(_permitted(free, move), _shifted(nodes, move), -1)
-        kinds[abs(int(_shifted(nodes, move).flat[0] - nodes[inside].flat[0]))] = sum(map(abs, move))
+    nodes = np.arange(free.size, dtype=np.int32).reshape(free.shape)
     changes = np.array([sum(map(abs, move)) for move in moves], dtype=np.int32)
-    coordinates = np.stack(np.unravel_index(nodes.ravel(), free.shape), axis=1).astype(np.int32) - 1
-    return Grid(
-        free, np.ascontiguousarray(coordinates), neighbours.reshape(free.size, -1), changes, kinds
-    )
+    rows = [np.where(_permitted(free, move), _moved(nodes, move), -1).ravel() for move in moves]
+    # how far each move leads in the order of the nodes
+    apart = np.abs(np.array(moves) @ nodes.strides) // nodes.itemsize
+    kinds = np.zeros(apart.max() + 1, dtype=np.int32)
+    kinds[apart] = changes
+    coordinates = np.ascontiguousarray(np.argwhere(nodes >= 0).astype(np.int32) - 1)
+    return Grid(free, coordinates, np.stack(rows, axis=1).astype(np.int32), changes, kinds)
 
 
 def _permitted(free: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
     """Return for every node whether a move can be made: an order of its parts passes free nodes."""
-    parts = [
-        tuple(step if axis == other else 0 for other in range(len(move)))
-        for axis, step in enumerate(move)
-    ]
-    permitted = np.zeros([size - 2 for size in free.shape], dtype=bool)
-    for order in itertools.permutations([part for part in parts if any(part)]):
-        place = np.zeros(len(move), dtype=int)
-        route = _shifted(free, tuple(place))
-        for part in order:
-            place = place + part
-            route = route & _shifted(free, tuple(place))
+    parts = np.diag(move)[np.flatnonzero(move)]
+    permitted = np.zeros_like(free)
+    for order in itertools.permutations(parts):
+        route = free
+        for place in np.cumsum(order, axis=0):
+            route = route & _moved(free, tuple(place))
         permitted |= route
     return permitted
 
 
+def _moved(values: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
+    """Return the values one move away from every node; a free node's neighbours are in the grid."""
+    return np.roll(values, [-step for step in move], range(values.ndim))
+
+
 def front(of: Grid, sources: NDArray[np.integer[Any]], neighbourhood: int) -> NodeArray:
-    """Return after how many steps a wave front reaches every node (Barraquand & Latombe 1991).
+    """Return after how many steps (nodes,) a wave front arrives (Barraquand & Latombe 1991).
 
-    Args:
-        of: The grid; the front makes the moves that it permits.
-        sources: Indices of the nodes it starts from.
-        neighbourhood: p: a step changes at most so many coordinates.
-
-    Returns:
-        (nodes,) steps, `UNREACHED` where it never comes.
+    It starts from the nodes of the indices `sources`, and a step changes at most `neighbourhood`
+    coordinates, p. `UNREACHED`: it never comes there.
     """
     steps, queue = np.empty(of.num_nodes, dtype=np.int32), np.empty(of.num_nodes, dtype=np.int32)
     starts = np.asarray(sources, dtype=np.int32)
@@ -139,15 +124,7 @@ def front(of: Grid, sources: NDArray[np.integer[Any]], neighbourhood: int) -> No
 def spread_front(
     neighbours: NodeArray, num_moves: int, sources: NodeArray, steps: StepArray, queue: NodeArray
 ) -> None:
-    """Run the kernel of `front`.
-
-    Args:
-        neighbours: (nodes, moves), see `Grid`.
-        num_moves: How many of the moves the front makes.
-        sources: (any,) indices of nodes.
-        steps: (nodes,), written.
-        queue: (nodes,) scratch.
-    """
+    """Run the kernel of `front`: the first `num_moves` moves; `queue` (nodes,) is scratch."""
     # the sources, each once
     steps[:] = UNREACHED
     head, tail = 0, 0
@@ -166,11 +143,3 @@ def spread_front(
                 steps[other] = steps[node] + 1
                 queue[tail] = other
                 tail += 1
-
-
-def _shifted(padded: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
-    """Return the values one move away from every node, of an array with a ring around it."""
-    stop = [size - 1 for size in padded.shape]
-    return padded[
-        tuple(slice(1 + step, last + step) for step, last in zip(move, stop, strict=True))
-    ]

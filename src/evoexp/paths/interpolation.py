@@ -7,17 +7,9 @@ from evoexp.records import FloatArray
 
 
 def interpolate_linear(via_points: FloatArray, substeps: int) -> FloatArray:
-    """Return configurations at fractions 1/s, 2/s, … 1 of every segment.
+    """Return configurations at fractions 1/s, 2/s, … 1 of every segment, (nq, N · s, lanes).
 
-    Args:
-        via_points: (nq, N + 1, lanes).
-        substeps: s ≥ 1.
-
-    Returns:
-        (nq, N · s, lanes); every s-th is a via-point, bit for bit.
-
-    Raises:
-        ValueError: If `substeps` is less than 1.
+    The via-points are (nq, N + 1, lanes); every s-th result is one, bit for bit. ValueError: s < 1.
     """
     if substeps < 1:
         raise ValueError(f"substeps must be at least 1, was {substeps}")

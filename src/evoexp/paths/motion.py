@@ -34,11 +34,7 @@ class Motion(NamedTuple):
         return coefficients
 
     def at(self, t: float) -> FloatArray:
-        """Return q (nq,) at t in [0, segments].
-
-        Raises:
-            ValueError: If t lies outside.
-        """
+        """Return q (nq,) at t in [0, segments]; ValueError outside."""
         if not 0.0 <= t <= self.num_segments:
             raise ValueError(f"t must lie in [0, {self.num_segments}], was {t}")
         segment = min(int(t), max(self.num_segments - 1, 0))
@@ -61,8 +57,8 @@ class Motion(NamedTuple):
     def speed_bound(self, segment: int, begin: float = 0.0, end: float = 1.0) -> FloatArray:
         """Return an upper bound (nq,) of |dq/du| on a segment's u in [begin, end].
 
-        The derivative's Bézier coefficients on the interval; its values lie between the least and
-        the greatest of them.
+        The derivative's values lie between the least and the greatest of its Bézier coefficients
+        there.
         """
         if self.coefficients is None:
             return np.asarray(np.abs(self.q[segment + 1] - self.q[segment]))
@@ -75,9 +71,7 @@ class Motion(NamedTuple):
 def cubic_motion(coefficients: FloatArray) -> Motion:
     """Return a motion from power coefficients (segments, 4, nq), lowest power first.
 
-    Raises:
-        ValueError: If their shape is another, or a segment does not begin where the one before ends
-            (to 1e-9).
+    ValueError: they have another shape, or a segment does not begin where the one before ends.
     """
     coefficients = np.ascontiguousarray(coefficients, dtype=np.float64)
     if coefficients.ndim != 3 or coefficients.shape[0] == 0 or coefficients.shape[1] != 4:
@@ -108,11 +102,8 @@ def spline_motion(spline: Any) -> Motion:
 def clamped_cubic(q: FloatArray) -> Motion:
     """Return the cubic spline through configurations q (instants, nq) that starts and ends at rest.
 
-    It is two times continuously differentiable, and as smooth as "a polynomial of the third order
-    to ensure second order derivability" (Curkovic et al. 2013, Fig. 9) can be.
-
-    Raises:
-        ValueError: If there are fewer than two configurations.
+    It is as smooth as "a polynomial of the third order to ensure second order derivability"
+    (Curkovic et al. 2013, Fig. 9) can be. ValueError: there are fewer than two configurations.
     """
     from scipy.interpolate import CubicSpline  # only curves need it, and it takes long to load
 
@@ -148,14 +139,7 @@ def top_speeds(motion: Motion) -> FloatArray:
 
 @kernel
 def speed_bound(coefficients: FloatArray, joint: int, begin: float, end: float) -> float:
-    """Return an upper bound of a joint's |dq/du| on [begin, end] of a segment.
-
-    Args:
-        coefficients: (4, nq) of the segment.
-        joint: Index into q.
-        begin: u where the part begins.
-        end: u where it ends.
-    """
+    """Return an upper bound of a joint's |dq/du| on [begin, end] of coefficients (4, nq)."""
     c1, c2, c3 = coefficients[1, joint], 2.0 * coefficients[2, joint], 3.0 * coefficients[3, joint]
     first = abs(c1 + begin * (c2 + begin * c3))
     last = abs(c1 + end * (c2 + end * c3))

@@ -87,10 +87,7 @@ def find_samples(
     total: Vector,
     places: Offsets,
 ) -> None:
-    """Write every target and the last sample of its segment not beyond it, or the first.
-
-    Their places, and those of the segments, are written, too.
-    """
+    """Write targets, the last sample of every segment not beyond it, and their places."""
     segment = spread(0.0)
     for i in range(U1, N):
         own = i * VECTOR
@@ -103,7 +100,7 @@ def find_samples(
         store_places(places, at.samples + own, begin)
         # bisection down to eight samples, among which lengths are counted
         sample = spread(0.0) if S == VECTOR else halve(w, S, at, target, own, places)
-        sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target, 7)
+        sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target)
         store(w, at.found + own, sample)
         store_places(places, at.samples + own, begin + sample)
         instant = np.float64(S) * segment + sample
@@ -131,12 +128,7 @@ def halve(
 def parameter(
     target: Vector, sample: Vector, speeds: tuple[Vector, Vector], lengths: tuple[Vector, Vector]
 ) -> Vector:
-    """Return where a target lies between two samples, in samples from the segment's begin.
-
-    Args:
-        sample: The first of both, counted within its segment.
-        lengths: Up to both.
-    """
+    """Return where a target lies between two samples, in samples from the segment's begin."""
     v0, v1 = speeds
     length = lengths[1] - lengths[0]
     r = target - lengths[0]
@@ -147,8 +139,7 @@ def parameter(
     below = begin + root(begin * begin + r * length * (v1 - v0) * both)
     x = r * both / below
     x = select(below > 0.0, x, spread(0.0))
-    inside: Vector = select(x < 1.0, x, spread(1.0))
-    return sample + inside
+    return sample + select(x < 1.0, x, spread(1.0))
 
 
 @inlined

@@ -10,7 +10,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vector_rows import Eight, transposed
-from evoexp.numeric.vectors import Vector, load, root, select, spread, store
+from evoexp.numeric.vectors import LANES, Vector, load, root, select, spread, store
 from evoexp.paths.workspace import U0, U1, U2, U3, U4, U5, U6, U7, VECTOR, Layout
 from evoexp.records import FloatArray
 
@@ -30,12 +30,7 @@ def fit_splines(
 ) -> None:
     """Copy the coordinates of eight paths to the knots in w and solve for m (Thomas algorithm).
 
-    Args:
-        first: Place of point 0 of the arm's first joint there, for the first of the paths.
-        pitch: Distance of two points there.
-        N: Number of segments.
-        pivots: Factor of the splines' system.
-        at: Places in it.
+    `first` is the place of point 0 of the arm's first joint, `pitch` the distance of two points.
     """
     to_joint = (N + U1) * pitch
     for joint in range(joints):
@@ -79,14 +74,8 @@ def write_rows(joints: np.uint64, w: FloatArray, at: Layout) -> None:
 def store_rows(w: FloatArray, place: np.uint64, pitch: np.uint64, vectors: Eight) -> None:
     """Write eight vectors side by side into the rows of their lanes."""
     rows = transposed(vectors)
-    store(w, place, rows[0])
-    store(w, place + pitch, rows[1])
-    store(w, place + U2 * pitch, rows[2])
-    store(w, place + U3 * pitch, rows[3])
-    store(w, place + U4 * pitch, rows[4])
-    store(w, place + U5 * pitch, rows[5])
-    store(w, place + U6 * pitch, rows[6])
-    store(w, place + U7 * pitch, rows[7])
+    for k in range(LANES):
+        store(w, place + np.uint64(k) * pitch, rows[k])
 
 
 @inlined
@@ -102,19 +91,6 @@ def load_eight(w: FloatArray, place: np.uint64) -> Eight:
         load(w, place + U6 * VECTOR),
         load(w, place + U7 * VECTOR),
     )
-
-
-@inlined
-def store_eight(w: FloatArray, place: np.uint64, vectors: Eight) -> None:
-    """Write eight vectors one behind the other."""
-    store(w, place, vectors[0])
-    store(w, place + VECTOR, vectors[1])
-    store(w, place + U2 * VECTOR, vectors[2])
-    store(w, place + U3 * VECTOR, vectors[3])
-    store(w, place + U4 * VECTOR, vectors[4])
-    store(w, place + U5 * VECTOR, vectors[5])
-    store(w, place + U6 * VECTOR, vectors[6])
-    store(w, place + U7 * VECTOR, vectors[7])
 
 
 @inlined

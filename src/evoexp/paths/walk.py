@@ -100,8 +100,7 @@ def _turn(
     """
     x, nothing = load(direction, first * VECTOR), spread(0.0)
     if stop - first == ONE:
-        scale: Vector = select(x == nothing, nothing, 1.0 / magnitude(x))
-        return scale
+        return select(x == nothing, nothing, 1.0 / magnitude(x))
     second = (first + ONE) * VECTOR
     y = load(direction, second)
     sine, cosine = sincos((2.0 * load(drawn, np.uint64(0)) - 1.0) * max_turn)
@@ -125,5 +124,4 @@ def _turn(
             store(direction, j * VECTOR, select(lies_on_axis, alone, before * (turned / below)))
         beyond = load(direction, k * VECTOR)
         below = root(turned * turned + beyond * beyond)
-    found: Vector = select(below == nothing, nothing, 1.0 / below)
-    return found
+    return select(below == nothing, nothing, 1.0 / below)

@@ -95,9 +95,7 @@ def layout(joints: np.uint64, N: np.uint64, S: np.uint64) -> Layout:
 
 
 def spline_pivots(num_segments: int, end_condition: EndCondition) -> FloatArray:
-    """Return the reciprocal pivots (N + 1,) of the system for m.
-
-    m is a sixth of a cubic spline's second derivatives.
+    """Return the reciprocal pivots (N + 1,) of the system for m, a sixth of the second derivatives.
 
     Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add the
     first equation 2 m[0] + m[1] = a[1] − a[0] and the last, m[N−1] + 2 m[N] = a[N−1] − a[N].

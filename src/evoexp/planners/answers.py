@@ -1,8 +1,7 @@
 """Answers of a planner beside motions: judged populations, tables, covers, departures.
 
-Departures are ways in which a solution is none of the task, each in a phrase for people. A motion
-that never leaves the start touches nothing and is certified; only its ends tell that it does not do
-what was asked for.
+A motion that never leaves the start touches nothing and is certified; only its departures tell that
+it does not do what was asked for.
 """
 
 import math
@@ -60,6 +59,20 @@ def num_values(shape: Shape) -> int:
     return sum(math.prod(part) for part in shape)
 
 
+def in_shape(solution: FloatArray, *shape: int) -> FloatArray:
+    """Return a flat solution in a shape, whose first size may be −1: any number.
+
+    Raises:
+        ValueError: If it has another size.
+    """
+    size = math.prod(shape)
+    rest = solution.size % size if size < 0 else abs(solution.size - size)
+    if solution.ndim != 1 or solution.size == 0 or rest:
+        must = f"a multiple of {-size} values" if size < 0 else f"{size} values"
+        raise ValueError(f"a solution has {must}, was {solution.shape}")
+    return np.ascontiguousarray(solution.reshape(shape))
+
+
 def of_place(name: str, given: FloatArray, wanted: FloatArray, unit: str) -> list[str]:
     """Return a phrase if a configuration or place is another one than the task's, of any shape.
 
@@ -78,6 +91,12 @@ def of_limits(names: Sequence[str], values: FloatArray, limits: FloatArray, unit
         for name, beyond in zip(names, np.maximum(below, above).tolist(), strict=True)
         if beyond > SAME
     ]
+
+
+def of_postures(postures: FloatArray, start: FloatArray, limits: FloatArray) -> list[str]:
+    """Compare the start of postures (postures, joints) [rad] with the task's, all with limits."""
+    at_start = of_place("the start", postures[0], start, "rad")
+    return at_start + of_limits(joint_names(len(start)), postures.T, limits, "rad")
 
 
 def joint_names(count: int) -> list[str]:

@@ -1,8 +1,4 @@
-"""Motions of arms between two configurations: start and goal in degrees, bodies, and their covers.
-
-Planners that take a robot from one configuration to another share this problem: start and goal
-within limits and free of contact, the collision model that a search tests, the exact bodies.
-"""
+"""Motions of arms between two configurations: start and goal in degrees, bodies, covers."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,17 +10,20 @@ from evoexp.collision.bodies.body_models import BodyModel
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.collision.box_support import coal
-from evoexp.collision.scene import Scene, obstacle_pairs, scene
+from evoexp.collision.scene import Part, Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.answers import CoverShape
+from evoexp.paths.motion import Motion
+from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
 from evoexp.planners.moveit_tasks import (
     arm_motion,
+    as_motion,
     hull_notes,
     touching,
     with_allowed_pairs,
 )
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.mesh_pieces import convex_shape
@@ -73,14 +72,46 @@ class ArmProblem:
         return np.asarray(np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE)
 
 
+class ArmDefaults(PlannerDefaults):
+    """The usual answers of a planner of motions between two configurations."""
+
+    def path(self, problem: Any, solution: FloatArray) -> FloatArray:
+        """Return the configurations of a flat solution, (instants, nq) [deg]."""
+        raise NotImplementedError
+
+    def parts(self, problem: Any, motion: Motion) -> tuple[Part, ...]:
+        """Return the whole motion; arms and obstacles have margins of their own."""
+        return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
+
+    def departures(self, problem: Any, solution: FloatArray) -> list[str]:
+        """Compare start and goal of every arm with the task's, and angles with their limits."""
+        path = self.path(problem, solution)
+        found = ["there is no path, one configuration only"] if len(path) == 1 else []
+        for arm, (a, b) in enumerate(problem.arm_slices):
+            for end, row, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
+                name = f"the {end} of arm {arm + 1}"
+                found += of_place(name, path[row, a:b], wanted[a:b], "deg")
+        return found + of_limits(joint_names(path.shape[1]), path.T, problem.limits, "deg")
+
+    def notes(self, problem: Any) -> list[str]:
+        """Describe the covers of bodies, where bodies are covered."""
+        collision, bodies = problem.collision, problem.scene
+        if not isinstance(collision, CoveredCollision):
+            return []
+        first = collision.assembly.geometry.ngeoms  # the robot's bodies, then the obstacles
+        obstacles = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
+        hulls = [name for name, (shape, _, _) in obstacles if isinstance(shape, coal.ConvexBase)]
+        return [*collision.notes(problem.length_unit), *hull_notes(hulls)]
+
+    def covers(self, problem: Any) -> tuple[CoverShape, ...]:
+        """Return the circles, spheres and capsules that the search tests."""
+        return cover_shapes(problem.collision)
+
+
 def arm_problem(
     robot: Robot, scenario: ArmTask, model: TouchingSpheres | CoveredBodies
 ) -> ArmProblem:
-    """Build the robot, and check that start and goal fit it and are free of collision.
-
-    Raises:
-        SettingError: If they do not, or are not.
-    """
+    """Build the robot; a SettingError refuses a start or goal that does not fit it, or collides."""
     assembly = robot.build()
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
@@ -122,13 +153,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
     """Return a task as a motion between configurations, all joints relative to the link before."""
     if isinstance(task, GridMotion):
         task.blocked()  # refuses ends that are blocked
-        return ArmMotion(
-            q_start=(tuple(map(float, task.start)),),
-            q_goal=(tuple(map(float, task.goal)),),
-            security_margin=task.security_margin,
-            length_unit=task.length_unit,
-            obstacles=task.bodies(),
-        )
+        start, goal = ([tuple(map(float, end))] for end in (task.start, task.goal))
+        return as_motion(task, start, goal, task.bodies())
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
     from evoexp.collision.planar.link_collision import two_link_arms  # and its kernels
@@ -138,14 +164,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         raise SettingError("scenario.stationary", must, list(task.stationary))
     arms = two_link_arms(assembly)
     ends = task.ends(np.array([arm.base for arm in arms]), np.array([arm.lengths for arm in arms]))
-    start, goal = (tuple((one, two - one) for one, two in end.tolist()) for end in ends)
-    return ArmMotion(
-        q_start=start,
-        q_goal=goal,
-        security_margin=task.security_margin,
-        length_unit=task.length_unit,
-        obstacles=task.obstacles,
-    )
+    q_start, q_goal = ([(one, two - one) for one, two in end.tolist()] for end in ends)
+    return as_motion(task, q_start, q_goal, task.obstacles)
 
 
 def cover_shapes(
@@ -157,29 +177,8 @@ def cover_shapes(
     return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
 
 
-def cover_notes(
-    collision: SphereCollision | CoveredCollision, bodies: Scene, unit: str
-) -> list[str]:
-    """Describe the covers of bodies, where bodies are covered.
-
-    Args:
-        bodies: The exact bodies: the robot's first, then the obstacles.
-        unit: Name of the scene's unit of length.
-    """
-    if not isinstance(collision, CoveredCollision):
-        return []
-    first = collision.assembly.geometry.ngeoms
-    obstacles = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
-    hulls = [name for name, (shape, _, _) in obstacles if isinstance(shape, coal.ConvexBase)]
-    return [*collision.notes(unit), *hull_notes(hulls)]
-
-
 def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> None:
-    """Refuse a start or goal beyond the limits of a joint.
-
-    Raises:
-        SettingError: Naming the joint.
-    """
+    """Refuse a start or goal beyond the limits of a joint, by a SettingError that names it."""
     model, slides = assembly.model, assembly.table.slides
     for field, q in zip(FIELDS, ends, strict=True):
         low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -200,10 +199,7 @@ def _covered(
     given: ArmTask,  # the task as the scenario has it; names the pairs that may touch
     ends: tuple[FloatArray, FloatArray],
 ) -> tuple[CoveredCollision, Scene]:
-    """Return the covered bodies of a robot, and the exact ones, pairs of one arm included.
-
-    Refuse a start or goal beyond limits, or where bodies touch.
-    """
+    """Return the covered bodies, and the exact ones, pairs of one arm included; check both ends."""
     ignored: tuple[tuple[int, int], ...] = ()
     bodies = scene(assembly, task.obstacles, self_pairs=True)
     if isinstance(given, MoveitTask):
@@ -221,11 +217,7 @@ def _covered(
 
 
 def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
-    """Refuse a configuration q (nq,) [rad, m] at which exact bodies touch.
-
-    Raises:
-        SettingError: Naming the pair that overlaps most.
-    """
+    """Refuse q (nq,) [rad, m] at which exact bodies touch, by the pair that overlaps most."""
     data, placements = bodies.model.createData(), bodies.geometry.createData()
     pin.updateGeometryPlacements(bodies.model, data, bodies.geometry, placements, q)
     worst, found = 0.0, ""

@@ -1,8 +1,4 @@
-"""Searches whose kernels compute several generations per call: each call gives a block of them.
-
-With kernels that take some ten microseconds per generation, a call for each would be a third of the
-time, and a record of each another third.
-"""
+"""Searches whose kernels compute several generations per call: each call gives a block of them."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -26,21 +22,16 @@ SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, 
 
 
 def generations_per_call(most: int, size: int, cached: int) -> int:
-    """Return how many generations are best computed in one call of a kernel.
+    """Return how many generations of `size` [B] are best computed in one call of a kernel.
 
-    Args:
-        most: Behind so many, the call itself takes no time any more.
-        size: Memory of a generation [B].
-        cached: Memory beyond which generations would push each other out of the caches [B].
+    Behind `most` the call itself takes no time; beyond `cached` [B] they push each other out of
+    caches.
     """
     return max(1, min(most, cached // max(1, size)))
 
 
 class TableSearch(ABC):
-    """One run, whose generations are rows of tables: number g is at place g modulo `num_places`.
-
-    The best of a generation is one individual, unless a subclass says otherwise.
-    """
+    """One run, whose generations are rows of tables: number g is at place g modulo `num_places`."""
 
     costs: FloatArray  # (places, …, individuals)
     # of the generator behind each generation computed last, where it is ahead of them
@@ -135,10 +126,7 @@ class TableSearch(ABC):
 
     @abstractmethod
     def population(self, index: int) -> NDArray[Any]:
-        """Return the population of a generation of the last call.
-
-        That of the run's last generation is hashed. It is empty where it is there no longer.
-        """
+        """Return the population of a generation of the last call; empty if it is gone."""
 
 
 class GeneticSearch(TableSearch):
@@ -179,20 +167,19 @@ class GeneticSearch(TableSearch):
     def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Compute the generations behind one with their numbers; return the last one computed.
 
-        Args:
-            uniforms: (generations, `num_drawn`) in [0, 1).
-            normals: (genes, offspring) normal deviates, for one generation; or none.
-            first: The present generation.
+        These are uniforms (generations, `num_drawn`) in [0, 1), and normals (genes, offspring) or
+        none.
         """
 
 
 class ScaledSearch(TableSearch):
     """A run whose parents are chosen as in `scaled_selection`, by blocks of uniform numbers.
 
-    Numbers are drawn when the last ones are used up. All generations of a call are recorded with
-    the generator as it is behind the last of them: the number of generations per call enters the
-    digest.
+    All generations of a call are recorded with the generator as it is behind the last of them: the
+    number of generations per call enters the digest.
     """
+
+    table: Any  # a NamedTuple of arrays, whose first axis are generations that take turns
 
     def __init__(self, ga: ScaledGenetic, per_call: int, num_drawn: int) -> None:
         """Begin a run that draws `num_drawn` uniform numbers at once, at least."""
@@ -200,15 +187,24 @@ class ScaledSearch(TableSearch):
         self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
         self.draws = Draws(num_drawn)
 
+    def at(self, generation: int) -> Any:
+        """Return the population of a generation: views of the table."""
+        return type(self.table)(*(values[generation % len(values)] for values in self.table))
+
     @abstractmethod
-    def breed(self, generation: int) -> bool:
-        """Compute the generation behind one; return whether the draws sufficed."""
+    def breed(self, present: Any, following: Any) -> bool:
+        """Write the population that follows another; return whether the draws sufficed."""
+
+    @abstractmethod
+    def note(self, population: Any, place: int) -> None:
+        """Write the record of a generation to a place."""
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations, each anew with more numbers if these did not suffice."""
         for generation in range(first, last):
-            before = self.draws.block.taken.item(0)
-            while not self.breed(generation):
+            before, following = self.draws.block.taken.item(0), self.at(generation + 1)
+            while not self.breed(self.at(generation), following):
                 self.draws.block.taken[0], before = before, 0
                 self.draws.extend(rng)
+            self.note(following, (generation + 1) % self.num_places)
         return last

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +28,7 @@ def links_of_bodies(assembly: Assembly) -> dict[str, str]:
 
 
 def with_allowed_pairs(assembly: Assembly, task: MoveitTask) -> Assembly:
-    """Return a robot with the pairs of bodies that may touch by the task's matrix.
-
-    Of pairs that the robot itself names, the matrix has the last word.
-    """
+    """Return a robot with the pairs that may touch: the task's matrix has the last word."""
     allowed, disabled = task.allowed, set(assembly.disabled)
     for (one, link), (two, other) in combinations(links_of_bodies(assembly).items(), 2):
         may_touch = allowed.may_touch(link, other)
@@ -52,12 +50,19 @@ def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
         tuple(tuple(_typed(assembly, q)[a:b].tolist()) for a, b in assembly.arm_slices)
         for q in (task.start_configuration(assembly.joint_names), q_goal)
     )
+    return as_motion(task, start, goal, world.obstacles)
+
+
+def as_motion(
+    task: Any, start: Sequence[Any], goal: Sequence[Any], obstacles: Sequence[Any]
+) -> ArmMotion:
+    """Return a motion between two configurations [deg], arm by arm, with the margin of a task."""
     return ArmMotion(
-        q_start=start,
-        q_goal=goal,
+        q_start=tuple(start),
+        q_goal=tuple(goal),
         security_margin=task.security_margin,
         length_unit=task.length_unit,
-        obstacles=world.obstacles,
+        obstacles=tuple(obstacles),
     )
 
 

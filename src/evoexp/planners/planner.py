@@ -1,22 +1,13 @@
-"""The planner's protocol, its usual answers, and the one keeper of the best solution so far.
+"""A planner's obligations, its usual answers, and the one keeper of the best solution so far.
 
 A planner is a component whose fields are its settings. It never logs, draws, sleeps, reads the
-clock or a file; its randomness is an argument. `PlannerDefaults` answers what most planners answer
-alike; everything else a planner writes itself. `evoexp.testing` checks every obligation.
+clock or a file; its randomness is an argument. `Planner` names what every planner writes itself,
+`PlannerDefaults` answers what most answer alike. `evoexp.testing` checks every obligation.
 """
 
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Literal,
-    NamedTuple,
-    Protocol,
-    TypeVar,
-    runtime_checkable,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +20,7 @@ from evoexp.planners.answers import JudgementArrays as JudgementArrays
 from evoexp.planners.answers import Shape as Shape
 from evoexp.planners.answers import num_values as num_values
 from evoexp.records import Best, Block, BoolArray, FloatArray
+from evoexp.validation import Component
 
 Reproducibility = Literal["bits", "environment"]
 Populations = Generator[FloatArray, JudgementArrays, None]
@@ -36,24 +28,14 @@ Populations = Generator[FloatArray, JudgementArrays, None]
 COPIES = 5
 
 
-Problem = TypeVar("Problem")
-
-
-@runtime_checkable
-class Planner(Protocol[Problem]):
-    """All obligations of a planner; `problem` is the value that its own `prepare` returned."""
+class Planner(Protocol):
+    """Members that a planner writes itself; `problem` is the value that its `prepare` returned."""
 
     # the registered name; a guest's begins with the name of its distribution
     component: ClassVar[str]
     revision: ClassVar[int]  # raised whenever the same settings give other results than before
-    # `bits`: the same seed gives the same bits on every machine; `environment`: only on
-    # machines with the same libraries and processor (`reproduce` then compares numbers, to
-    # 1e-9, where the environment differs)
-    reproducibility: ClassVar[Reproducibility]
-    # whether it is a truth that needs no seed, and so has one replicate
-    is_reference: ClassVar[bool]
 
-    def prepare(self, robot: Any, scenario: Any) -> Problem:
+    def prepare(self, robot: Any, scenario: Any) -> Any:
         """Build the robot, check the scenario against it, return the problem.
 
         The annotations of both parameters name the types of robots and scenarios that fit.
@@ -62,98 +44,34 @@ class Planner(Protocol[Problem]):
             SettingError: If robot, scenario and settings contradict each other.
         """
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then all generations, one or several per `Block`."""
 
-    @property
-    def num_generations(self) -> int:
-        """Generations after the initial one, at most."""
-
-    def num_evaluations(self, index: int) -> int:
-        """Return how many individuals of a population generation `index` evaluates, 0 the initial.
-
-        A planner that starts anew after a failed attempt says so of each attempt. The last
-        generation of a planner that ends by itself (`stop_reason`) may evaluate fewer.
-        """
-
-    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+    def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw `count` individuals as the initial population is drawn, individuals last.
 
         Raises:
             SettingError: If the planner has several populations, one after the other.
         """
 
-    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
+    def cost(self, problem: Any, population: FloatArray) -> JudgementArrays:
         """Judge a population as `sample` returns it."""
 
-    def improve(
-        self, problem: Problem, population: FloatArray, rng: np.random.Generator
-    ) -> FloatArray | None:
-        """Return a population after one pass of the planner's local operator, without evolution.
-
-        Controls repeat it at equal evaluations. `population` itself stays as it is.
-
-        Returns:
-            Like `sample`; None if the planner has no such operator.
-        """
-
-    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+    def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
         """Return one individual of a population as a flat solution."""
 
-    def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
+    def motion(self, problem: Any, solution: FloatArray) -> Motion | None:
         """Return the joint-space motion of a solution; None where the answer is no motion."""
 
-    def parts(self, problem: Problem, motion: Motion) -> Sequence[Part]:
-        """Return the pieces of a motion in the order of time, each with its exact bodies.
-
-        Most motions are one piece; without pieces there is nothing to judge by.
-        """
-
-    def security_margin(self, problem: Problem) -> float:
-        """Return the clearance that the task requires [length unit of the scene]."""
-
-    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
+    def evaluate(self, problem: Any, solution: FloatArray) -> dict[str, float]:
         """Return the named terms of a solution, as `evoexp evaluate` prints them.
 
         Raises:
             ValueError: If the solution has not the documented shape.
         """
 
-    def departures(self, problem: Problem, solution: FloatArray) -> Sequence[str]:
-        """Return the ways in which a solution is none of the task, each in a phrase.
-
-        Another start or goal, a joint beyond its limits, a forbidden move; nothing about
-        collisions, which `parts` are judged for, nor about a goal that a search comes near to.
-        """
-
-    def shape(self, problem: Problem) -> Shape:
+    def shape(self, problem: Any) -> Shape:
         """Return the documented shape of a solution, part by part."""
-
-    def memory(self, problem: Problem) -> int:
-        """Return an estimate of the memory that a run takes beyond that of its problem [B].
-
-        It need not be exact, yet grow as the memory does with populations, paths and generations:
-        a run that would take more than there is is refused before it begins.
-        """
-
-    def prior_queries(self, problem: Problem) -> int:
-        """Return how many configurations the task itself says to be free or not, as a map does.
-
-        Comparisons add them to the queries of a run: another planner asks for them one by one.
-        """
-
-    def listing(self, problem: Problem, solution: FloatArray) -> Listing | None:
-        """Return a table with one row per configuration; None if the planner has none."""
-
-    def notes(self, problem: Problem) -> Sequence[str]:
-        """Return remarks on settings and problem, one per line, for `show` and the report."""
-
-    def covers(self, problem: Problem) -> Sequence[CoverShape]:
-        """Return the spheres and capsules that the search tests in place of the robot's bodies.
-
-        They are drawn beside the bodies. A search that tests other shapes, or the bodies
-        themselves, returns none.
-        """
 
 
 class PlannerDefaults:
@@ -164,12 +82,16 @@ class PlannerDefaults:
     `security_margin`.
     """
 
+    # `bits`: the same seed gives the same bits on every machine; `environment`: only on
+    # machines with the same libraries and processor (`reproduce` then compares numbers, to
+    # 1e-9, where the environment differs)
     reproducibility: ClassVar[Reproducibility] = "bits"
+    # whether it is a truth that needs no seed, and so has one replicate
     is_reference: ClassVar[bool] = False
+    # whether `cost` takes any real numbers within its `bounds` where those of `sample` differ
     is_real_coded: ClassVar[bool] = False
-    """Whether `cost` takes any real numbers within its `bounds` where those of `sample` differ."""
+    # whether a solution that is not `solved` may miss the goal, which `departures` do not tell
     goal_is_region: ClassVar[bool] = False
-    """Whether a solution that is not `solved` may miss the goal, which `departures` do not tell."""
 
     if TYPE_CHECKING:
         ga: Any  # has `population_size`, `num_offspring` and `num_generations`
@@ -182,26 +104,39 @@ class PlannerDefaults:
 
     @property
     def num_generations(self) -> int:
-        """The generations of `ga`."""
+        """Generations after the initial one, at most."""
         return int(self.ga.num_generations)
 
     def num_evaluations(self, index: int) -> int:
-        """Return the population's size at first, then the number of offspring."""
+        """Return how many individuals of a population generation `index` evaluates, 0 the initial.
+
+        A planner that starts anew after a failed attempt says so of each attempt. The last
+        generation of a planner that ends by itself (`stop_reason`) may evaluate fewer.
+        """
         return int(self.ga.num_offspring if index else self.ga.population_size)
 
     def improve(
         self, problem: Any, population: FloatArray, rng: np.random.Generator
     ) -> FloatArray | None:
-        """Return None: there is no local operator."""
+        """Return a population after one pass of the planner's local operator, without evolution.
+
+        Controls repeat it at equal evaluations. `population` itself stays as it is.
+
+        Returns:
+            Like `sample`; None if the planner has no such operator.
+        """
         return None
 
     def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
-        """Return the whole motion with the problem's scene, or nothing without a scene."""
+        """Return the pieces of a motion in the order of time, each with its exact bodies.
+
+        Most motions are one piece; without pieces there is nothing to judge by.
+        """
         bodies = problem.scene
         return () if bodies is None else (Part(bodies, 0, motion.num_segments),)
 
     def security_margin(self, problem: Any) -> float:
-        """Return the problem's margin."""
+        """Return the clearance that the task requires [length unit of the scene]."""
         return float(problem.security_margin)
 
     def cost_of_terms(self, terms: Mapping[str, float]) -> float:
@@ -212,29 +147,53 @@ class PlannerDefaults:
         return terms.get("cost", math.nan)
 
     def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
-        """Return none: every solution of the documented shape is one of the task."""
+        """Return the ways in which a solution is none of the task, each in a phrase.
+
+        Another start or goal, a joint beyond its limits, a forbidden move; nothing about
+        collisions, which `parts` are judged for, nor about a goal that a search comes near to.
+        """
         return ()
 
     def memory(self, problem: Any) -> int:
-        """Return the memory of `COPIES` populations of solutions."""
+        """Return an estimate of the memory that a run takes beyond that of its problem [B].
+
+        It need not be exact, yet grow as the memory does with populations, paths and generations:
+        a run that would take more than there is is refused before it begins.
+        """
         individuals = max(self.num_evaluations(0), self.num_evaluations(1))
         return 8 * COPIES * num_values(self.shape(problem)) * individuals
 
     def prior_queries(self, problem: Any) -> int:
-        """Return 0: a search asks for all that it knows."""
+        """Return how many configurations the task itself says to be free or not, as a map does.
+
+        Comparisons add them to the queries of a run: another planner asks for them one by one.
+        """
         return 0
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
-        """Return None: there is no table."""
+        """Return a table with one row per configuration; None if the planner has none."""
         return None
 
     def notes(self, problem: Any) -> Sequence[str]:
-        """Return no remarks."""
+        """Return remarks on settings and problem, one per line, for `show` and the report."""
         return ()
 
     def covers(self, problem: Any) -> Sequence[CoverShape]:
-        """Return none: the search tests no spheres and capsules."""
+        """Return the spheres and capsules that the search tests in place of the robot's bodies.
+
+        They are drawn beside the bodies. A search that tests other shapes, or the bodies
+        themselves, returns none.
+        """
         return ()
+
+
+# all members that a planner must have, by name
+MEMBERS = {
+    name: getattr(kind, name, None)
+    for kind in (Planner, PlannerDefaults)
+    for name in {**kind.__annotations__, **vars(kind)}
+    if name[0] != "_"
+}
 
 
 class Candidate(NamedTuple):
@@ -289,8 +248,8 @@ class Keeper:
 
     def record_judged(
         self,
-        planner: Planner[Problem],  # makes a solution of the best individual
-        problem: Problem,
+        planner: Any,  # makes a solution of the best individual
+        problem: Any,
         population: FloatArray,  # individuals last, all of them new in this generation
         judgement: JudgementArrays,  # of this population
     ) -> Block:
@@ -303,7 +262,7 @@ class Keeper:
             solution = planner.solution(problem, population, k)
             return Candidate(solution, judgement.named_terms(k), solved)
 
-        if getattr(planner, "answers_are_proven", False):
+        if planner.answers_are_proven:
             self.keep_proven(judgement.cost, feasible, candidate)
         elif self.improves(lowest):
             self.keep(lowest, candidate(k, bool(feasible[k])))
@@ -352,3 +311,37 @@ class Keeper:
             stop_reason,
             arrays,
         )
+
+
+class WrappedPlanner(PlannerDefaults, Component):
+    """Answers as the wrapped planner does; controls write `populations`, references `evolve`."""
+
+    planner: Any  # the planner that it stands beside; `Condition` checks that it is one
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem."""
+        return self.planner.prepare(robot, scenario)
+
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield a control's populations, judged as the wrapped planner judges its own."""
+        keeper, judged, populations = Keeper(), None, self.populations(problem, rng)
+        for _ in range(self.planner.num_generations + 1):
+            population = next(populations) if judged is None else populations.send(judged)
+            judged = self.planner.cost(problem, population)
+            yield keeper.record_judged(self.planner, problem, population, judged)
+
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
+        """Yield the populations of a control; each is sent back judged."""
+        raise NotImplementedError
+
+
+def _as_wrapped(name: str) -> Any:
+    """Return a member that is the wrapped planner's."""
+    if callable(MEMBERS[name]):
+        return lambda self, *arguments: getattr(self.planner, name)(*arguments)
+    return property(lambda self: getattr(self.planner, name))
+
+
+_OWN = {"component", "revision", "reproducibility", "is_reference", "is_real_coded", "improve"}
+for _name in MEMBERS.keys() - vars(WrappedPlanner).keys() - _OWN:
+    setattr(WrappedPlanner, _name, _as_wrapped(_name))

@@ -7,7 +7,6 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import Certificate, certificate, is_proven
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import Planner
 from evoexp.records import FloatArray
 
 Acceptance = Literal["model", "certified", "margin"]
@@ -21,7 +20,7 @@ margins.
 KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave as it is
 
 
-def judge_motion(planner: Planner[Any], problem: Any, motion: Motion | None) -> Certificate:
+def judge_motion(planner: Any, problem: Any, motion: Motion | None) -> Certificate:
     """Judge a planner's motion by the exact bodies; without a motion the certificate is empty."""
     if motion is None:
         return Certificate()
@@ -29,10 +28,7 @@ def judge_motion(planner: Planner[Any], problem: Any, motion: Motion | None) -> 
 
 
 class Proofs:
-    """Judges whole motions for a search that accepts proven ones only, each solution once.
-
-    Answers are the same on every processor; a motion that cannot be decided is not proven.
-    """
+    """Judges whole motions for a search that accepts proven ones only, each solution once."""
 
     def __init__(self, planner: Any, problem: Any) -> None:
         """Begin with no verdict; the planner's field `acceptance` is not `model`."""
@@ -71,7 +67,7 @@ class Proofs:
     def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
         """Judge individuals, the cheapest first, until one is proven; return it, None if none is.
 
-        In `costs` (individuals,) refuted ones cost inf then; what costs inf is not judged.
+        In `costs` (individuals,) refuted ones cost inf then.
         """
         while np.isfinite(costs[k := int(np.argmin(costs))]):
             if self.is_proven(solution(k)):

@@ -28,11 +28,7 @@ class Problem(NamedTuple):
 
 
 def reaching_problem(robot: Robot, scenario: PickAndPlace, model: LinkEllipses) -> Problem:
-    """Build the robot and check that the start fits it and is free of collision.
-
-    Raises:
-        SettingError: If it is not, or the robot has no joint limits to draw postures from.
-    """
+    """Build the robot; a SettingError refuses a start that does not fit it, or collides."""
     assembly = robot.build()
     table = scenario.obstacle_table()
     collision = model.bind(assembly, table)

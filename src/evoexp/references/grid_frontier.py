@@ -1,18 +1,13 @@
 """The best path over a grid: Dijkstra for length alone, else the best known one and a bound.
 
 The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no shortest-path
-algorithm minimises it. The truth is enclosed:
+algorithm minimises it. It is enclosed: from above, by the best path of the frontier of D + μ ΣS
+over all μ, or the best walk if it has no loops; from below, by walks, which may pass nodes again:
+for a given number N of nodes a walk's cost ε D + (λ / N) ΣS is a sum over moves and nodes, whose
+least value dynamic programming finds, the exact optimum where nodes may be passed again.
 
-- from above, by valid paths: the best of the frontier of D + μ ΣS over all μ, or the best walk if
-  it has no loops;
-- from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
-  ε D + (λ / N) ΣS is a sum over moves and nodes, so dynamic programming over (node, number of
-  nodes) finds the best walk. The least cost of all N is the exact optimum where nodes may be passed
-  again, else a bound.
-
-Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`): every path
-of the frontier was improved by exchanges of a few nodes, and the bounds were raised by Lagrangian
-relaxation. `scripts/update-grid-truths` finds both.
+Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`), by
+exchanges of a few nodes and by Lagrangian relaxation: see `scripts/update-grid-truths`.
 """
 
 import hashlib
@@ -79,14 +74,10 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
 
 @kernel
 def best_walks(arrivals: Arrivals, weights: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
-    """Return the least costs of walks of 0 … `count` nodes, and the best walk of `count` nodes.
+    """Return the least costs of walks of 0 … `count` nodes, and the best of `count`, (count,).
 
-    Args:
-        weights: (nodes,) cost of passing a node.
-        count: Most nodes.
-
-    Returns:
-        (count + 1,), inf where there is no walk from two nodes on; (count,).
+    The costs (count + 1,) are inf where there is no walk; `weights` (nodes,) are those of passing a
+    node.
     """
     tails, lengths, ends = arrivals.tails, arrivals.lengths, arrivals.ends
     num = len(weights)
@@ -213,11 +204,9 @@ class GridFrontier(Reference):
         return hashed.hexdigest()[:32]
 
     def floors(self, network: Network, known: float, walks: FloatArray) -> tuple[FloatArray, float]:
-        """Return bounds by walks below the paths of 0, 1, … nodes, and below those of more nodes.
+        """Return bounds by walks (see `best_walk`) below the paths of 0, 1, … nodes, and of more.
 
-        Args:
-            known: Cost of some path.
-            walks: (numbers, 2) of `best_walk`.
+        `known` is the cost of some path.
         """
         epsilon, lam = self.planner.objective.weights
         most = most_nodes(network, epsilon, lam, known, self.max_nodes)
@@ -251,8 +240,7 @@ class GridFrontier(Reference):
 def geometric_series(first: float, last: float, count: int) -> list[float]:
     """Return numbers of equal ratios, the same bits on every machine.
 
-    `numpy.geomspace` takes powers, whose last bits depend on the processor, and these decide
-    between paths that cost the same.
+    `numpy.geomspace` takes powers, whose last bits depend on the processor, and these decide ties.
     """
     if count == 1:
         return [first]
@@ -297,9 +285,7 @@ def best_walk(
 
     These are (numbers, 2) numbers of nodes and costs, and (nodes,). Numbers whose walks are shown
     to be no better than another walk, or than some path of cost `known`, are left out.
-
-    Raises:
-        SettingError: If no walk has as few nodes as `max_nodes`.
+    SettingError: no walk has as few nodes as `max_nodes`.
     """
     most = most_nodes(network, epsilon, lam, known, max_nodes)
     arrivals, costs = arrivals_of(network, epsilon), np.full(most + 1, np.inf)
@@ -321,9 +307,8 @@ def best_walk(
             costs[count] = costs_at(count, count)[count]
             least = min(least, costs[count])
     if not np.isfinite(costs.min()):
-        raise SettingError(
-            "reference.max_nodes", "as many as a path from start to goal has", max_nodes
-        )
+        must = "as many as a path from start to goal has"
+        raise SettingError("reference.max_nodes", must, max_nodes)
     best = int(costs.argmin())
     _, walk = best_walks(arrivals, lam / best * arrivals.unsafeness, best)
     numbers = np.flatnonzero(np.isfinite(costs))

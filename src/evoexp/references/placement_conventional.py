@@ -62,18 +62,12 @@ class PlacementConventional(Reference):
             method: [programme.descend(x) for x in starts],
             "subgradient": [End(x, cost, 7 * self.num_steps) for x, cost in slid],
         }
-        arrays = {
-            name: np.array(
-                [
-                    [
-                        *np.round(model.theta(end.x), DIGITS),
-                        end.cost if programme.is_legal(end.x, 1e-6) else np.inf,
-                    ]
-                    for end in found
-                ]
-            )
-            for name, found in ends.items()
-        }
+
+        def row(end: End) -> FloatArray:
+            cost = end.cost if programme.is_legal(end.x, 1e-6) else np.inf
+            return np.array([*np.round(model.theta(end.x), DIGITS), cost])
+
+        arrays = {name: np.array([row(end) for end in found]) for name, found in ends.items()}
         every = np.concatenate(list(arrays.values()))
         # of mirror images always the same
         best = min(every, key=lambda row: (round(float(row[2]), 6), *row[:2]))
@@ -95,18 +89,13 @@ class PlacementConventional(Reference):
             numbers = np.arange(first + 1, min(first + chunk, count) + 1)
             pairs = low[:, None] + (high - low)[:, None] * ((0.5 + numbers * R2[:, None]) % 1.0)
             costs, theta_3 = problem.model.measure_branches(pairs)
-            rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2).reshape(
-                -1, 3
-            )
-            found += list(rows[(problem.model.weights.greatest > costs.T).ravel()])
+            rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2)
+            found += list(rows[problem.model.weights.greatest > costs.T])
             if len(found) >= self.num_starts:
                 break
         else:
-            raise SettingError(
-                "reference.num_starts",
-                f"at most {len(found)}, the feasible postures",
-                self.num_starts,
-            )
+            must = f"at most {len(found)}, the feasible postures"
+            raise SettingError("reference.num_starts", must, self.num_starts)
         places = np.array(found[: self.num_starts])
         return [model.directions(place[:2], float(place[2])) for place in places], places
 
@@ -115,12 +104,9 @@ def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArr
     """Follow a projected subgradient method from every start; return the best places and E there.
 
     Pin & Culioli (1992), whom Chen & Zalzala (1995) compare with, solved the minimax problem by a
-    subgradient method; its details are not printed. Here, every step has a given length and goes
-    against the slope of E along the surface of postures that reach the target, and is followed by
-    a projection onto that surface.
-
-    From directions x (3, starts) [rad] that reach the target to places (3, starts) and E (starts,),
-    by steps of given lengths (steps,) [rad].
+    subgradient method; its details are not printed. Here, every step (steps,) [rad] goes against
+    the slope of E along the surface of postures that reach the target, from directions x (3,
+    starts) [rad] on it, and is followed by a projection onto that surface.
     """
     x, ends, moves = x.copy(), x.copy(), np.ones(x.shape[1])
     costs, units = model.costs(*model.links(x)), np.eye(3)[:, :, None]
@@ -153,5 +139,4 @@ def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArr
 
 def _height(model: Directions, up: FloatArray) -> FloatArray:
     """Return by how much end-effectors are above their target, by the links' extents (3, n)."""
-    found: FloatArray = -model.target[1] + up[0] + up[1] + up[2]
-    return found
+    return np.asarray(-model.target[1] + up[0] + up[1] + up[2])

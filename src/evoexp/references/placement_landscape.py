@@ -25,8 +25,7 @@ class PlacementLandscape(Reference):
 
     def memory(self, problem: Any) -> int:
         """Return the memory of the terms of every pair of angles, besides the planner's."""
-        terms = 8 * TERM_VALUES * self.num_angles * self.num_angles
-        return terms + self.planner.memory(problem)
+        return 8 * TERM_VALUES * self.num_angles**2 + int(self.planner.memory(problem))
 
     def truth(self, problem: Any) -> Truth:
         """Measure the grid; the best of it is the solution."""

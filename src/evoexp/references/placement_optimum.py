@@ -32,8 +32,7 @@ TERM_VALUES = 5  # numbers kept for one pair of angles
 class PlacementOptimum(Reference):
     """The exact optimum of `placement_ga`'s cost, and all local minima that the search saw.
 
-    Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first. The optimum has 15 digits,
-    more than any code of 16 bits per angle.
+    Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first.
     """
 
     component: ClassVar[str] = "placement_optimum"
@@ -45,7 +44,7 @@ class PlacementOptimum(Reference):
 
     def memory(self, problem: Any) -> int:
         """Return the memory of the dense search, besides the planner's."""
-        return 8 * TERM_VALUES * self.num_angles**2 + self.planner.memory(problem)
+        return 8 * TERM_VALUES * self.num_angles**2 + int(self.planner.memory(problem))
 
     def truth(self, problem: Any) -> Truth:
         """Search, polish, and judge the best by the planner's own kernels."""
@@ -81,16 +80,9 @@ class PlacementOptimum(Reference):
 
 
 def lowest(model: Model, angle_limits: FloatArray, num_angles: int, count: int) -> FloatArray:
-    """Return the lowest feasible local minima of a dense search, the lowest first.
+    """Return the lowest feasible local minima of a dense search, the lowest first, at most `count`.
 
-    Args:
-        model: The planner's model.
-        angle_limits: (2, 2) of θ1 and θ2 [deg].
-        num_angles: Values of either angle.
-        count: Number of minima, at most.
-
-    Returns:
-        (≤ count, 3) θ1, θ2 [deg], and the branch: 0, or 1 where the third link points to −x.
+    They are (≤ count, 3): θ1, θ2 [deg], and the branch: 0, or 1 where the third link points to −x.
     """
     low, high = angle_limits.T[:, :, None]
     angles = low + (high - low) * (np.arange(num_angles) / num_angles)  # (2, n)
@@ -108,28 +100,22 @@ def lowest(model: Model, angle_limits: FloatArray, num_angles: int, count: int) 
 
 
 def minima_of(costs: FloatArray, in_reach: BoolArray, turns: BoolArray) -> BoolArray:
-    """Return which places are not above any place around them, (2, n, n).
+    """Return which places of costs (2, n, n), by branch, θ1, θ2, are not above any around them.
 
     Both values of θ3 are sheets of one surface, joined where the third link is upright: a place at
-    that edge is a minimum only if nothing around it on the other sheet is lower.
-
-    Args:
-        costs: (2, n, n) branch, θ1, θ2.
-        in_reach: (n, n).
-        turns: (2,) whether the first value of θ1 and of θ2 follows the last one.
+    that edge of what is `in_reach` (n, n) is a minimum only if nothing around it on the other sheet
+    is lower. `turns` (2,): whether the first value of θ1 and of θ2 follows the last one.
     """
     modes: Any = ["wrap" if whole else "constant" for whole in turns]
     around = ndimage.minimum_filter(costs, (1, 3, 3), mode=["nearest", *modes], cval=np.inf)
     at_edge = ndimage.minimum_filter(in_reach.astype(np.int8), (3, 3), mode=modes, cval=1) == 0
-    marked: BoolArray = (costs <= around) & (~at_edge | (costs <= around[::-1]))
-    return marked
+    return np.asarray((costs <= around) & (~at_edge | (costs <= around[::-1])))
 
 
 def polish(programme: Programme, x: FloatArray) -> End | None:
-    """Return the local minimum near the end of `Programme.descend`, to rounding.
+    """Return the local minimum near the end of `Programme.descend`, to rounding, or None.
 
     Newton's method solves the Karush–Kuhn–Tucker conditions; the margins that are 0 at x stay 0.
-    The result is None where the method does not converge.
     """
     z = programme.start(x)
     values, slopes = programme.measured(z)
@@ -145,12 +131,9 @@ def polish(programme: Programme, x: FloatArray) -> End | None:
         off = conditions(y)
         if np.abs(off).max() < 1e-13:
             break
-        jacobian = np.column_stack(
-            [
-                (conditions(y + unit) - conditions(y - unit)) / (2.0 * DIFFERENCE)
-                for unit in DIFFERENCE * np.eye(len(y))
-            ]
-        )
+        units = DIFFERENCE * np.eye(len(y))
+        changes = [conditions(y + unit) - conditions(y - unit) for unit in units]
+        jacobian = np.column_stack([change / (2.0 * DIFFERENCE) for change in changes])
         y, steps = y - np.linalg.lstsq(jacobian, off, rcond=None)[0], steps + 1
     moved = float(np.abs(y[:3] - x).max())
     if not np.isfinite(y).all() or moved > 1e-3 or np.abs(conditions(y)).max() > 1e-9:
@@ -167,6 +150,5 @@ def _is_lowest(model: Model, theta: FloatArray, branch: int, cost: float) -> boo
 
 def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:
     """Return whether θ1 and θ2 are those of a known minimum."""
-    return any(
-        np.abs((theta - other[:2] + TURN / 2) % TURN - TURN / 2).max() <= SAME for other in known
-    )
+    apart = [(theta - other[:2] + TURN / 2) % TURN - TURN / 2 for other in known]
+    return any(np.abs(each).max() <= SAME for each in apart)

@@ -9,6 +9,7 @@ use joint angles.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import optimize
 
 from evoexp.numeric.compilation import kernel
@@ -19,6 +20,8 @@ from evoexp.records import FloatArray
 INSIDE = 1e-11  # [rad], of torques [-]: on a limit, in spite of rounding, is within it
 TURN = 360.0  # [deg]
 SMALLEST = 1e-300  # keeps quotients finite
+STEP = 1e-30  # of complex steps: its square vanishes beside anything
+AnyArray = NDArray[Any]  # real, or complex for derivatives
 # rows: the objective, the height (which must be 0), then margins (which must not be negative)
 OBJECTIVE, HEIGHT, MARGINS = range(3)
 TORQUE_BOUNDS = 6  # margins of the minimax term: t − α τ and t + α τ
@@ -36,7 +39,10 @@ class Directions(NamedTuple):
     torque_limits: FloatArray  # (3, 2)
 
     def bounds(self) -> FloatArray:
-        """Return the finite limits, (m, 3); see `measure`."""
+        """Return the finite limits, (m, 3): limited quantity, 1.0 (from below) or −1.0, limit.
+
+        Quantities: 0, 1, 2 are joint angles; 3, 4, 5 torques.
+        """
         limits = np.concatenate([self.joint_limits, self.torque_limits])
         rows = [
             (float(k), sign, limit)
@@ -49,13 +55,11 @@ class Directions(NamedTuple):
     def theta(self, x: FloatArray) -> FloatArray:
         """Return θ1, θ2 [deg] of x, both in [−180, 180)."""
         angles = np.degrees(np.array([x[0], x[1] - x[0]]))
-        wrapped: FloatArray = angles - TURN * np.floor((angles + TURN / 2) / TURN)
-        return wrapped
+        return np.asarray(angles - TURN * np.floor((angles + TURN / 2) / TURN))
 
     def directions(self, theta: FloatArray, theta_3: float) -> FloatArray:
         """Return x of joint angles θ1, θ2 and θ3 [deg]."""
-        x: FloatArray = np.radians(np.cumsum([theta[0], theta[1], theta_3]))
-        return x
+        return np.asarray(np.radians(np.cumsum([theta[0], theta[1], theta_3])))
 
     def reaching(self, theta: FloatArray, to_the_left: bool) -> FloatArray:
         """Return x of θ1 and θ2 [rad] at which the end-effector has its height."""
@@ -64,9 +68,8 @@ class Directions(NamedTuple):
         upward = np.arcsin((self.target[1] - up[0] - up[1]) / self.lengths[2])
         third = np.pi - upward if to_the_left else upward
         # θ3 in [−π, π)
-        return np.array(
-            [one, both, third - 2.0 * np.pi * np.floor((third - both + np.pi) / (2.0 * np.pi))]
-        )
+        turns = np.floor((third - both + np.pi) / (2.0 * np.pi))
+        return np.array([one, both, third - 2.0 * np.pi * turns])
 
     def links(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the extents of the links along x and along y, both (3, …), at directions x."""
@@ -76,21 +79,21 @@ class Directions(NamedTuple):
         lengths = self.lengths.reshape((3,) + (1,) * (x.ndim - 1))
         return lengths * cosines, lengths * sines
 
-    def costs(self, across: FloatArray, up: FloatArray) -> FloatArray:
-        """Return E of Eq. 14 by the links' extents (3, …), without any cap.
-
-        Sums begin at the third link: the subgradient method has the same bits everywhere.
-        """
-        epsilon, lam, delta, *alphas = self.weights
-        # the end-effector seen from the joints 3, 2, 1: the Jacobian's columns, and torques (Eq. 8)
+    def torques(self, across: AnyArray, up: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
+        """Return the Jacobian's columns, x and y, and torques (Eq. 8), (3, …), joint 3 first."""
         jx, jy = -np.cumsum(up[::-1], axis=0), np.cumsum(across[::-1], axis=0)
-        torques = jx * self.force[0] + jy * self.force[1]
-        weighted = [
-            abs(alpha * torque) for alpha, torque in zip(alphas[::-1], torques, strict=True)
-        ]
+        return jx, jy, jx * self.force[0] + jy * self.force[1]
+
+    def costs(self, across: AnyArray, up: AnyArray, greatest: AnyArray | None = None) -> AnyArray:
+        """Return E of Eq. 14 by extents (3, …), uncapped; `greatest` replaces |α τ| (Eq. 11)."""
+        epsilon, lam, delta, *alphas = self.weights
+        jx, jy, torques = self.torques(across, up)
+        if greatest is None:
+            weighted = zip(alphas[::-1], torques, strict=True)
+            greatest = np.maximum.reduce([abs(alpha * torque) for alpha, torque in weighted])
         determinant = dot(jx, jx) * dot(jy, jy) - dot(jx, jy) ** 2
         singular = delta / np.maximum(determinant, SMALLEST)  # Eq. 13
-        costs = epsilon * dot(torques, torques) + lam * np.maximum.reduce(weighted) + singular
+        costs = epsilon * dot(torques, torques) + lam * greatest + singular
         # obstacles (Eq. 12); of each link the share before the point that avoids
         platform = self.target[0] - across[::-1].sum(axis=0)
         for gamma, link, place, x_o, y_o in self.avoided:
@@ -99,14 +102,12 @@ class Directions(NamedTuple):
                 share = 1.0 if k + 1 < link else place * (k + 1 == link)
                 dx, dy = dx + share * across[k], dy + share * up[k]
             costs = costs + gamma / np.maximum(dx * dx + dy * dy, SMALLEST)
-        found: FloatArray = costs
-        return found
+        return np.asarray(costs)
 
 
-def dot(one: FloatArray, two: FloatArray) -> FloatArray:
+def dot(one: AnyArray, two: AnyArray) -> AnyArray:
     """Return the scalar products of columns (3, …), added in the order of their rows."""
-    found: FloatArray = one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
-    return found
+    return np.asarray(one[0] * two[0] + one[1] * two[1] + one[2] * two[2])
 
 
 @kernel
@@ -117,13 +118,7 @@ def _sincos(x: FloatArray, sines: FloatArray, cosines: FloatArray) -> None:
 
 
 def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
-    """Return the criteria of a planner's model.
-
-    Args:
-        model: The planner's model.
-        angle_limits: (2, 2) of the planner's genes [deg]; a range of less than a turn limits θ1 or
-            θ2.
-    """
+    """Return the criteria of a planner's model; `angle_limits` below a turn limit θ1 or θ2."""
     task, joints = np.array(model.task), model.limits[:3].copy()
     for k, (least, greatest) in enumerate(angle_limits):
         if greatest - least < TURN:
@@ -143,30 +138,32 @@ class End(NamedTuple):
 
 
 class Programme:
-    """Minimise smooth(x) + λ t, t above every |α τ|, height 0, no margin negative; no t if λ is 0.
-
-    Attributes:
-        minimax: Whether t is a variable.
-    """
+    """Minimise smooth(x) + λ t, t above all |α τ|, height 0, no margin negative; no t if λ is 0."""
 
     def __init__(self, model: Directions) -> None:
         """Take the criteria."""
         self._model, self._bounds = model, model.bounds()
         self.minimax = bool(model.weights[1])
-        rows = MARGINS + TORQUE_BOUNDS * self.minimax + len(self._bounds)
-        self._values, self._slopes = np.empty(rows), np.empty((rows, 3 + self.minimax))
         self._where = b""
 
     def measured(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return objective, height and margins at z, (2 + margins,), and their derivatives.
-
-        Both arrays, the latter (2 + margins, len(z)), are valid until the next call.
-        """
-        where = z.tobytes()
-        if where != self._where:
-            measure(z, self._model, self._bounds, self._values, self._slopes)
-            self._where = where
+        """Return objective, height, margins at z, (2 + margins,), and slopes by complex steps."""
+        if z.tobytes() != self._where:
+            found = self._rows(z[:, None] + 1j * STEP * np.eye(len(z)))
+            self._values, self._slopes = found[:, 0].real.copy(), found.imag / STEP
+            self._where = z.tobytes()
         return self._values, self._slopes
+
+    def _rows(self, z: AnyArray) -> AnyArray:
+        """Return objective, height and margins (2 + margins, n) at complex places z (len(z), n)."""
+        model, x, t = self._model, z[:3], z[3] if self.minimax else 0.0 * z[0]
+        across, up = (model.lengths[:, None] * turn for turn in (np.cos(x), np.sin(x)))
+        torques = model.torques(across, up)[2][::-1]
+        weighted = model.weights[3:, None] * torques
+        quantities = [x[0], x[1] - x[0], x[2] - x[1], *torques]
+        margins = [*(t - weighted), *(t + weighted)] if self.minimax else []
+        margins += [sign * (quantities[int(k)] - limit) for k, sign, limit in self._bounds]
+        return np.array([model.costs(across, up, t), up.sum(axis=0) - model.target[1], *margins])
 
     def start(self, x: FloatArray) -> FloatArray:
         """Return z at directions x."""
@@ -187,7 +184,7 @@ class Programme:
     def descend(self, x: FloatArray, most_steps: int = 200) -> End:
         """Minimise E from x by sequential quadratic programming (SLSQP)."""
         height, margins = slice(HEIGHT, MARGINS), slice(MARGINS, None)
-        kinds = [("eq", height), ("ineq", margins)][: 1 + (len(self._values) > MARGINS)]
+        kinds = [("eq", height), ("ineq", margins)][: 1 + (self.minimax or len(self._bounds) > 0)]
         minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
         found = minimize(
             lambda z: float(self.measured(z)[0][OBJECTIVE]),
@@ -205,128 +202,3 @@ class Programme:
             options={"ftol": 1e-14, "maxiter": most_steps},
         )
         return End(found.x[:3], self.cost(found.x[:3]), int(found.nfev))
-
-
-@kernel
-def measure(
-    z: FloatArray, model: Directions, bounds: FloatArray, values: FloatArray, slopes: FloatArray
-) -> None:
-    """Measure the programme at one place.
-
-    Args:
-        z: (3,) or, with t, (4,).
-        bounds: (m, 3) the limited quantity (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or
-            −1.0: from below or above, the limit.
-        values: (2 + margins,) written: objective, height, margins.
-        slopes: (2 + margins, len(z)) written: their derivatives.
-    """
-    epsilon, lam, delta = model.weights[0], model.weights[1], model.weights[2]
-    f_x, f_y, avoided = model.force[0], model.force[1], model.avoided
-    # links; derivatives of every torque from the k-th joint inwards
-    across, up, torques, turns = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for k in range(3):
-        s, c = sincos(z[k])
-        across[k], up[k] = model.lengths[k] * c, model.lengths[k] * s
-        turns[k] = -f_x * across[k] - f_y * up[k]
-    # torques, norm, manipulability
-    slopes[:, :] = 0.0
-    jx, jy, xx, yy, xy, total = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(2, -1, -1):
-        jx, jy = jx - up[k], jy + across[k]
-        torques[k] = jx * f_x + jy * f_y  # Eq. 8
-        total += epsilon * torques[k] * torques[k]
-        xx, yy, xy = xx + jx * jx, yy + jy * jy, xy + jx * jy
-    determinant = xx * yy - xy * xy
-    if delta != 0.0:
-        total += delta / determinant
-    # their derivatives, by sums over the joints up to the k-th
-    reach, sum_x, sum_y, sum_torques = jy, 0.0, 0.0, 0.0
-    for k in range(3):
-        sum_x, sum_y, sum_torques = sum_x + jx, sum_y + jy, sum_torques + torques[k]
-        slopes[0, k] = 2.0 * epsilon * sum_torques * turns[k]
-        if delta != 0.0:
-            of_xx, of_yy = -2.0 * sum_x * across[k], -2.0 * sum_y * up[k]
-            of_xy = -sum_y * across[k] - sum_x * up[k]
-            of_determinant = of_xx * yy + xx * of_yy - 2.0 * xy * of_xy
-            slopes[0, k] -= delta * of_determinant / (determinant * determinant)
-        jx, jy = jx + up[k], jy - across[k]
-    # obstacles, height, minimax term, margins
-    for n in range(len(avoided)):
-        total += _avoid(avoided[n], model.target[0] - reach, across, up, slopes[0])
-    values[0], values[1] = total, up[0] + up[1] + up[2] - model.target[1]
-    for k in range(3):
-        slopes[1, k] = across[k]
-    if len(z) == 4:
-        values[0] += lam * z[3]
-        slopes[0, 3] = lam
-    _measure_margins(z, model.weights[3:], bounds, torques, turns, values, slopes)
-
-
-@kernel
-def _measure_margins(
-    z: FloatArray,
-    alphas: FloatArray,
-    bounds: FloatArray,
-    torques: FloatArray,
-    turns: FloatArray,
-    values: FloatArray,
-    slopes: FloatArray,
-) -> None:
-    """Measure the margins, and their derivatives where they are not 0.
-
-    Args:
-        z: As of `measure`, and so are `bounds`, `values` and `slopes`.
-        alphas: (3,) α1, α2, α3.
-        torques: (3,).
-        turns: (3,) derivative by each direction of every torque from its joint inwards.
-    """
-    # t above every weighted torque and its negative
-    row = 2
-    if len(z) == 4:
-        for sign in (-1.0, 1.0):
-            for k in range(3):
-                values[row] = z[3] + sign * alphas[k] * torques[k]
-                slopes[row, 3] = 1.0
-                for j in range(k, 3):
-                    slopes[row, j] = sign * alphas[k] * turns[j]
-                row += 1
-    # limits
-    for m in range(len(bounds)):
-        k, sign = int(bounds[m, 0]), bounds[m, 1]
-        if k < 3:
-            values[row] = sign * ((z[k] - z[k - 1] if k > 0 else z[k]) - bounds[m, 2])
-            slopes[row, k] = sign
-            if k > 0:
-                slopes[row, k - 1] = -sign
-        else:
-            values[row] = sign * (torques[k - 3] - bounds[m, 2])
-            for j in range(k - 3, 3):
-                slopes[row, j] = sign * turns[j]
-        row += 1
-
-
-@kernel
-def _avoid(
-    one: FloatArray, platform: float, across: FloatArray, up: FloatArray, slope: FloatArray
-) -> float:
-    """Return one term of Eq. 12, and add its derivatives to `slope`.
-
-    Args:
-        one: (5,) γ, link, place, X_o, Y_o.
-        platform: X_p.
-        across: (3,) the links' extents along x.
-        up: (3,) along y.
-        slope: (≥ 3,).
-    """
-    dx, dy = platform - one[3], -one[4]
-    for k in range(int(one[1])):
-        share = one[2] if k + 1 == int(one[1]) else 1.0
-        dx, dy = dx + share * across[k], dy + share * up[k]
-    square = dx * dx + dy * dy
-    for k in range(3):
-        share = (one[2] if k + 1 == int(one[1]) else 1.0) if k < int(one[1]) else 0.0
-        slope[k] -= (
-            2.0 * one[0] * (dx * (1.0 - share) * up[k] + dy * share * across[k]) / (square * square)
-        )
-    term: float = one[0] / square
-    return term

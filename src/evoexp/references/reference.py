@@ -13,8 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.planners.planner import Candidate, Keeper, Reproducibility
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import Candidate, Keeper, Reproducibility, WrappedPlanner
 from evoexp.records import Block, FloatArray
 
 
@@ -72,9 +71,9 @@ class Reference(WrappedPlanner):
 def one_thread() -> Iterator[None]:
     """Let BLAS and LAPACK use one thread in the body, however many they use elsewhere.
 
-    OpenBLAS gives other last digits with two threads than with one, and an optimiser that builds on
-    them takes other steps. A worker has one thread by its environment, but a replicate also runs
-    where numpy was loaded with all of them: `reproduce`, `runner=serial`, a notebook.
+    OpenBLAS gives other last digits with two threads than with one, and an optimiser takes other
+    steps. A worker has one thread, but a replicate also runs in `reproduce`, `runner=serial`, a
+    notebook.
     """
     import scipy.linalg  # noqa: F401  # it brings a BLAS of its own, limited once it is loaded
     from threadpoolctl import threadpool_limits

@@ -14,7 +14,7 @@ from typing import get_args
 import numpy as np
 
 from evoexp.condition import Condition
-from evoexp.planners.planner import Planner, Reproducibility
+from evoexp.planners.planner import MEMBERS, Reproducibility
 from evoexp.store.log_reader import read_log
 from evoexp.testing.evolution_record import Demand, evolution, finished, obligation
 from evoexp.validation import Component
@@ -29,16 +29,14 @@ STARTS_ANEW = "attempts"  # a term of planners that begin again where an attempt
 
 @obligation
 def every_member_is_there(condition: Condition) -> Iterator[Demand]:
-    """A planner has every member of the protocol `Planner`, with the same parameters."""
+    """A planner has every member that one must have, with the same parameters."""
     planner = condition.planner
     must = "a planner must be a Component, so that a configuration can name it"
     yield isinstance(planner, Component), must, type(planner).__name__
-    names = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
-    missing = [name for name in names if not hasattr(planner, name)]
+    missing = [name for name in MEMBERS if not hasattr(planner, name)]
     must = "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
     yield not missing, f"{must}gives the usual answers)", f"without {', '.join(missing)}"
-    for name in names:
-        wanted = getattr(Planner, name, None)
+    for name, wanted in MEMBERS.items():
         if not inspect.isfunction(wanted):
             continue
         method, expected = getattr(planner, name), list(inspect.signature(wanted).parameters)[1:]
@@ -150,7 +148,7 @@ def the_best_so_far_never_gets_worse(condition: Condition) -> Iterator[Demand]:
     found = evolution(condition)
     costs = [generation.best_cost for generation in found.generations]
     least = np.minimum.accumulate([each.best_cost_in_generation for each in found.generations])
-    if getattr(found.planner, "answers_are_proven", False):  # and cheaper ones may be refuted
+    if found.planner.answers_are_proven:  # and cheaper ones may be refuted
         must = "best_cost must never get worse, and be no less than the least cost so far"
         never_worse = all(a >= b for a, b in itertools.pairwise(costs))
         yield never_worse and bool(np.all(costs >= least)), must, costs

@@ -148,8 +148,7 @@ def terms_agree_with_evaluate(condition: Condition) -> Iterator[Demand]:
         both_nan = math.isnan(one) and math.isnan(two)
         must = f"evaluate must give the recorded {name} of the best solution, {one!r}"
         yield same or both_nan, must, repr(two)
-    cost_of_terms, cost = getattr(found.planner, "cost_of_terms", None), found.last.best_cost
-    told = float(cost_of_terms(terms)) if cost_of_terms else math.nan
+    told, cost = float(found.planner.cost_of_terms(terms)), found.last.best_cost
     must = f"cost_of_terms must give the recorded cost of the best solution, {cost!r}"
     same = math.isclose(cost, told, rel_tol=TOLERANCE, abs_tol=TOLERANCE)
     yield same or math.isnan(told) or not math.isfinite(cost), must, repr(told)

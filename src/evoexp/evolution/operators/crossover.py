@@ -57,9 +57,9 @@ class GeneCrossover(Crossover):
 def pairs_to_cross(
     genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray
 ) -> tuple[IntArray, FloatArray]:
-    """Write the parents themselves; return the pairs to be crossed, and the numbers of each pair.
+    """Write the parents; return the pairs to be crossed, and each pair's numbers (1 + 2 · genes).
 
-    These are (pairs, 1 + 2 · genes): the decision, then two for each gene.
+    These are the decision, then two for each gene.
     """
     copy_parents(genomes, parents, out)
     num_pairs, num_each = len(parents) // 2, 1 + 2 * len(genomes)

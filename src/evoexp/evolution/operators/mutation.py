@@ -26,8 +26,7 @@ class GeneMutation(Mutation):
 def draw_amounts(num_genes: int, count: int, context: Context) -> FloatArray:
     """Return for every gene (genes, count) how it is mutated: a uniform number, or −1 if it is not.
 
-    Where every gene may be, one number decides and, divided by the rate, is the amount: below the
-    rate the ratio is uniform again.
+    Where every gene may be, one number decides and, divided by the rate, is the amount.
     """
     amounts, rate, uniforms = np.empty((num_genes, count)), context.rate, context.uniforms
     if context.settings[0] == 0.0:

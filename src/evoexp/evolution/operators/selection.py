@@ -15,10 +15,8 @@ from evoexp.validation import Count, NonNegative
 def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -> None:
     """Draw parents with probabilities proportional to their weights (Goldberg 1989).
 
-    Args:
-        weights: (individuals,) ≥ 0; if all are 0, every individual is equally likely.
-        uniforms: (≥ parents,) in [0, 1).
-        chosen: (parents,) written: indices in the order drawn; neighbours are a random pairing.
+    If all weights (individuals,) are 0, every individual is equally likely. Neighbours among those
+    chosen (parents,) are a random pairing.
     """
     # the wheel: sums of weights up to each individual
     num = len(weights)

@@ -15,14 +15,11 @@ SEEDS = 2**32  # of numpy's older generators
 class CmaEs(RealVectorControl):
     """Adapts mean and covariance of a normal distribution of individuals to what costs least.
 
-    It begins with mean and covariance of individuals drawn as the planner draws its own first ones,
-    so that steps are as smooth as those are. With `improves` each individual goes through one pass
-    of the planner's local operator before it is judged, as the planner's own offspring do; what is
-    told to CMA-ES is the vector before it. A generation has as many individuals as a later one of
-    the planner. Where all steps have become too small to matter, or numbers leave those that can be
-    judged, it starts anew.
-
-    Linear algebra of the package makes the last bits those of an environment.
+    It begins with those of individuals drawn as the planner draws its own first ones. With
+    `improves` each individual goes through one pass of the planner's local operator before it is
+    judged; what is told to CMA-ES is the vector before it. Where all steps have become too small to
+    matter, or numbers leave those that can be judged, it starts anew. Linear algebra makes the last
+    bits those of an environment.
     """
 
     component: ClassVar[str] = "cma_es"

@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.planners.planner import Populations
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import Populations, WrappedPlanner
 from evoexp.validation import Count
 
 
@@ -15,10 +14,9 @@ class MultiStart(WrappedPlanner):
     """Draws a population, applies the planner's local operator again and again, and starts anew.
 
     The first generation of a start holds fresh samples; each of the next `num_sweeps` generations
-    holds the same individuals after one more pass of the planner's `improve`. Nothing is selected,
-    crossed or mutated. A generation evaluates as many individuals as the planner would evaluate in
-    it, so that both are equal in evaluations at every generation: where that number falls, the last
-    individuals are left out; where it rises, fresh samples join.
+    the same individuals after one more pass of the planner's `improve`. A generation evaluates as
+    many as the planner would in it: where that falls, the last are left out; where it rises, fresh
+    samples join.
     """
 
     component: ClassVar[str] = "multi_start"

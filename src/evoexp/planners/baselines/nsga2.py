@@ -16,12 +16,9 @@ ENDLESS = 10**9  # generations: this planner counts them itself
 class Nsga2(RealVectorControl):
     """Evolves a front: individuals that no other surpasses in all objectives at once.
 
-    Objectives are terms of the planner's own judgement; the answer is the individual of the least
-    cost of the planner. Operators are pymoo's defaults (simulated binary crossover, polynomial
-    mutation, binary tournament by rank and crowding), within the box that holds all individuals
-    drawn at first. A generation has as many individuals as a later one of the planner.
-
-    Linear algebra of libraries makes the last bits those of an environment.
+    Objectives are terms of the planner's own judgement; the answer is the individual of the
+    planner's least cost. Operators are pymoo's defaults, within the box of all individuals drawn at
+    first. Linear algebra of libraries makes the last bits those of an environment.
     """
 
     component: ClassVar[str] = "nsga2"

@@ -5,16 +5,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.planners.planner import Populations
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import Populations, WrappedPlanner
 
 
 class RandomSearch(WrappedPlanner):
-    """Draws every individual as the wrapped planner draws its initial population.
-
-    A generation draws as many individuals as the planner would evaluate in it, so that both are
-    equal in evaluations at every generation.
-    """
+    """Draws individuals as the wrapped planner draws its first ones, as many as it evaluates."""
 
     component: ClassVar[str] = "random_search"
 

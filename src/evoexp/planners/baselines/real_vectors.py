@@ -6,8 +6,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.planners.planner import COPIES, Planner, num_values
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import COPIES, WrappedPlanner, num_values
 from evoexp.records import BoolArray, FloatArray
 from evoexp.validation import Count
 
@@ -28,10 +27,7 @@ class RealVectors(NamedTuple):
     bounds: tuple[FloatArray, FloatArray]
 
     def population(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (individuals, variables) as the planner's `cost` takes individuals.
-
-        Numbers beyond the bounds are put there.
-        """
+        """Return vectors (individuals, variables) as `cost` takes them, put within bounds."""
         found = np.repeat(self.template[..., None], len(vectors), axis=-1)
         found[self.changes] = vectors.T
         low, high = (bound[..., None] for bound in self.bounds)
@@ -48,7 +44,7 @@ class RealVectorControl(WrappedPlanner):
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
-        if not getattr(self.planner, "is_real_coded", False):
+        if not self.planner.is_real_coded:
             of = self.planner.component
             must = f"left out: individuals of {of} are no vectors of real numbers"
             raise SettingError("control", must, self.component)
@@ -56,24 +52,19 @@ class RealVectorControl(WrappedPlanner):
 
     def num_evaluations(self, index: int) -> int:
         """Return the planner's evaluations of a later generation, or the fewest there may be."""
-        return max(self.fewest, self.planner.num_evaluations(max(1, index)))
+        return max(self.fewest, int(self.planner.num_evaluations(max(1, index))))
 
     def memory(self, problem: Any) -> int:
         """Return the planner's estimate, and that of the drawn individuals and of matrices."""
         values = num_values(self.shape(problem))
         own = 8 * values * (COPIES * self.num_drawn + self.matrices * values)
-        return self.planner.memory(problem) + own
+        return int(self.planner.memory(problem)) + own
 
 
-def real_vectors(planner: Planner[Any], problem: Any, drawn: FloatArray) -> RealVectors:
-    """Return where a search among individuals begins: as the planner's own first ones are spread.
+def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
+    """Return where a search begins, by a real-coded planner's `sample` `drawn`, individuals last.
 
-    Args:
-        planner: A real-coded planner, which has `bounds(problem)`.
-        drawn: Individuals of its `sample`, individuals last.
-
-    Raises:
-        SettingError: If they do not differ.
+    SettingError: the individuals do not differ.
     """
     template = np.ascontiguousarray(drawn[..., 0])
     changes = np.asarray((drawn != template[..., None]).any(axis=-1))
@@ -92,15 +83,12 @@ def real_vectors(planner: Planner[Any], problem: Any, drawn: FloatArray) -> Real
     least = np.maximum(own, LEAST * variance)
     covariance[diagonal] = (1.0 - SHRINKAGE) * own + SHRINKAGE * least
     covariance /= variance
-    bounds = planner.bounds(problem)  # type: ignore[attr-defined]  # real-coded ones have them
+    bounds = planner.bounds(problem)  # real-coded ones have them
     return RealVectors(template, changes, mean, covariance, float(np.sqrt(variance)), bounds)
 
 
 def transposed_root(matrix: FloatArray) -> FloatArray:
-    """Return Lᵀ of the Cholesky factor L of a positive definite matrix (n, n).
-
-    LAPACK's has other bits on other processors.
-    """
+    """Return Lᵀ of the Cholesky factor L of a matrix; LAPACK's bits depend on processors."""
     root = np.triu(matrix)  # rows are columns of L
     for k in range(len(root)):
         for i in range(k):

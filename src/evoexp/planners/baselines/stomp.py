@@ -21,12 +21,11 @@ from evoexp.validation import Count, Positive, Rate
 class Stomp(RealVectorControl):
     """Moves one trajectory by the weighted mean of noisy ones (Kalakrishnan et al. 2011).
 
-    Noise is as smooth as the individuals that the planner draws at first are: it has their
-    covariance. Unlike in STOMP a cost is that of a whole trajectory, the planner's own, so that all
-    its via-points share one weight: exp(−h (S − min S) / (max S − min S)) (their Eq. 11). The
-    trajectory that results is judged too, as the first of the next generation. Noise shrinks by a
-    factor per generation; after `patience` generations without a better trajectory the search
-    starts anew from an individual that the planner draws, with the first noise.
+    Noise has the covariance of the individuals that the planner draws at first. Unlike in STOMP a
+    cost is that of a whole trajectory, so that all its via-points share one weight: exp(−h (S − min
+    S) / (max S − min S)) (their Eq. 11). The trajectory that results is judged as the first of the
+    next generation. Noise shrinks by a factor per generation; without a better trajectory for
+    `patience` generations the search starts anew from an individual that the planner draws.
     """
 
     component: ClassVar[str] = "stomp"
@@ -57,10 +56,7 @@ class Stomp(RealVectorControl):
             sigma *= self.shrinkage
 
     def weights(self, costs: FloatArray) -> FloatArray:
-        """Return the weights of trajectories (individuals,) by their costs, of sum 1.
-
-        Infeasible ones weigh nothing.
-        """
+        """Return weights of trajectories by their costs, of sum 1; 0: infeasible."""
         finite = np.isfinite(costs)
         if not finite.any():
             return np.full(len(costs), 1.0 / len(costs))

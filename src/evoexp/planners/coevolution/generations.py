@@ -1,40 +1,43 @@
 """One run of co-evolving populations: the way from a generation to the next (Fig. 2).
 
-Of robots that are lines several generations are one call of a kernel: with populations of 100,
-Python between the steps would take a third of the time. Others are evaluated by
-`Coevolution.evaluated`, one generation after the other.
+Of robots that are lines several generations are one call of a kernel: Python between the steps
+would take a third of the time. Others are evaluated by `Coevolution.evaluated`.
 """
 
-from typing import TYPE_CHECKING, NamedTuple, Self
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.best_team import BestTeam
+from evoexp.collision.certifier.certificate import PAIR
+from evoexp.evolution.best_team import BestTeam, best_team
 from evoexp.evolution.hall_of_fame import Hall, HallRules
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
+    Evaluated,
     Heredity,
     LineTask,
-    breed_robots,
     copy_fronts,
     count_members,
     evaluate_lines,
     renew,
+    survey,
 )
-from evoexp.planners.coevolution.proven_teams import ProvenTeams
-from evoexp.planners.coevolution.teams import Evaluated, survey, teamable_costs
 from evoexp.planners.driver import TableSearch, generations_per_call
 from evoexp.planners.planner import Candidate
+from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from evoexp.planners.coevolution.planner import Coevolution, Problem
 
 NOT_FINITE = "points and bases must be finite and below 1e70"
+MOST = 100  # teams that are judged of one generation; the others are no answer
 PER_CALL = 8  # generations that are computed in one call, at most
 CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
 
@@ -46,16 +49,6 @@ class Table(NamedTuple):
     judged: Evaluated  # of each place
     teams: IntArray  # (places, robots) the best team of each; −1 if there is none
     team_costs: FloatArray  # (places,) inf if there is none
-
-    @classmethod
-    def room(cls, places: int, robots: int, genes: int, count: int) -> Self:
-        """Return memory for some generations."""
-        return cls(
-            np.empty((places, robots, genes, count)),
-            Evaluated.room(places, robots, count),
-            np.empty((places, robots), dtype=np.int64),
-            np.empty(places),
-        )
 
 
 @kernel
@@ -73,11 +66,7 @@ def evolve(
     summaries: FloatArray,  # (places, 4) written: see `TableSearch`
     taken: IntArray,  # (generations,) written: how many numbers each of them took
 ) -> bool:
-    """Go on from one generation of lines to others.
-
-    Returns:
-        False if a coordinate is not finite.
-    """
+    """Go on from one generation of lines to others; return False if a coordinate is not finite."""
     table, summaries, taken = borrowed((table, summaries, taken))
     populations, places, begin = table.populations, len(summaries), 0
     for step in range(len(rates)):
@@ -120,35 +109,41 @@ def follow(
 ) -> int:
     """Renew the hall of fame, and breed the generation that follows one.
 
-    Returns:
-        How many numbers it took.
+    It has offspring, then elites, then members of the hall, unchanged. Returns how many numbers it
+    took: uniform in [0, 1), for each moving robot those of parents, cross-over, mutation.
     """
+    rules = heredity.breeding
     own, other = index % len(table.team_costs), (index + 1) % len(table.team_costs)
-    hall, before, judged = heredity.hall, table.populations[own], table.judged
+    hall, before, judged = heredity.hall, table.populations[own], at_place(table.judged, own)
     if heredity.copies_fronts:
-        criteria, costs = judged.criteria[own], judged.costs[own]
-        num_teams[0] = copy_fronts(before, criteria, costs, heredity)
+        num_teams[0] = copy_fronts(before, judged, heredity)
     elif len(hall.teams):
-        num_teams[0] = renew(
-            before,
-            judged.criteria[own],
-            judged.collisions[own],
-            teamable_costs(judged.own[own], judged.blocked[own]),
-            table.teams[own],
-            num_teams[0],
-            heredity,
-        )
-    moving, fewest, teams = 0, num_teams[0], hall.teams[: num_teams[0]]
+        num_teams[0] = renew(before, judged, table.teams[own], num_teams[0], heredity)
+    teams, num_elites, taken = hall.teams[: num_teams[0]], heredity.num_elites, 0
+    fewest, elites = len(teams), np.empty(num_elites, dtype=np.int64)
     for robot in range(len(before)):
-        moving += heredity.moving[robot]
         fewest = min(fewest, count_members(teams, robot))
-    numbers = np.sum(heredity.breeding.sizes[fewest])
-    draws = uniforms[: moving * numbers].reshape((moving, numbers))
-    costs, following = judged.costs[own], table.populations[other]
-    breed_robots(
-        select, cross, mutate, draws, index, rate, before, costs, teams, heredity, following
-    )
-    return int(moving * numbers)
+    size = np.sum(rules.sizes[fewest])
+    for robot in range(len(before)):
+        held = count_members(teams, robot)
+        members, count = teams[:held, robot].copy(), before.shape[2] - num_elites - held
+        for k in range(held):
+            teams[k, robot] = count + num_elites + k
+        out, genomes = table.populations[other, robot], before[robot]
+        costs, normals = judged.costs[robot], np.empty((0, 0))
+        if not heredity.moving[robot]:
+            out[:] = genomes
+            continue
+        parents = np.empty(count, dtype=np.int64)
+        draws, taken = uniforms[taken : taken + size], taken + size
+        breed(
+            select, cross, mutate, draws, normals, index, rate, rules, costs, genomes, parents, out
+        )
+        # elites and members of the hall, untouched
+        choose_elites(costs, elites)
+        copy_members(genomes, elites, out, count)
+        copy_members(genomes, members, out, count + num_elites)
+    return int(taken)
 
 
 def per_call(robots: int, count: int) -> int:
@@ -168,12 +163,15 @@ class TeamSearch(TableSearch):
         stepwise = not problem.collision.is_lines or ga.restart_after is not None
         self._at_once = not stepwise and self._proven is None
         super().__init__(ga, per_call(robots, self._size) if self._at_once else 1)
-        self._table = Table.room(
-            self.num_places, robots, 2 * planner.num_configurations, self._size
+        num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
+        self._table = Table(
+            np.empty((self.num_places, robots, num_genes, self._size)),
+            Evaluated.room(self.num_places, robots, self._size),
+            np.empty((self.num_places, robots), dtype=np.int64),
+            np.empty(self.num_places),
         )
         self.costs, self._waiting = self._table.judged.costs, 0
         by_genome, operators = ga.hall_distinct == "genome", ga.operators
-        num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
         genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
         counts = [free - teams for teams in range(ga.num_hall_teams + 1)]
         self._operators = operators.addresses
@@ -269,3 +267,82 @@ class TeamSearch(TableSearch):
     def criteria(self, place: int) -> FloatArray | None:
         """Return the criteria of all individuals."""
         return np.asarray(self._table.judged.criteria[place])
+
+
+class ProvenTeams:
+    """Judges the cheapest teams of populations, and counts collisions where one is refuted."""
+
+    def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
+        """Begin with no verdict; the planner's `acceptance` is not `model`."""
+        self._planner, self._problem = planner, problem
+        self._proofs = Proofs(planner, problem)
+        links = [arm.tolist() for arm in problem.assembly.arm_slices]
+        joints = [item.parentJoint - 1 for item in problem.scene.geometry.geometryObjects]
+        self._robots = {
+            name: next((r for r, (first, stop) in enumerate(links) if first <= joint < stop), -1)
+            for name, joint in zip(problem.scene.names, joints, strict=True)
+        }
+
+    @property
+    def num_certificates(self) -> int:
+        """Motions judged so far."""
+        return self._proofs.num_certificates
+
+    def settle(self, populations: FloatArray, found: Evaluated) -> BestTeam:
+        """Judge teams, the cheapest first, until one is proven; return it, or one not found.
+
+        Collisions and costs of those who are refuted are raised.
+        """
+        for _ in range(MOST):
+            best = best_team(found.collisions, found.teamable)
+            if not best.found or self._is_proven(populations, found, best.individuals):
+                return best
+        return BestTeam(np.full(len(found.own), -1), np.inf)
+
+    def settle_each(self, populations: FloatArray, found: Evaluated, costs: FloatArray) -> None:
+        """Judge the cheapest teams of the first robot's individuals until one is proven.
+
+        `costs` (individuals,) are those of their cheapest teams; changed. See `settle`.
+        """
+        for _ in range(MOST):
+            k = int(np.argmin(costs))
+            if not costs[k] < np.inf or self._is_proven(populations, found, found.team_of(k)):
+                return
+            costs[k] = found.cost_of(found.team_of(k))
+        costs[:] = np.inf
+
+    def team_of(self, populations: FloatArray, found: Evaluated, individual: int) -> IntArray:
+        """Return the cheapest proven team with an individual of the first robot; see `settle`."""
+        for _ in range(MOST):
+            team = found.team_of(individual)
+            if not found.cost_of(team) < np.inf or self._is_proven(populations, found, team):
+                break
+        return team
+
+    def _is_proven(self, populations: FloatArray, found: Evaluated, team: IntArray) -> bool:
+        """Whether a team is proven; one that is refuted counts as colliding."""
+        solution = self._planner.team_solution(self._problem, populations, team)
+        proven = self._proofs.is_proven(solution)
+        if not proven:
+            self._refute(found, team, self._proofs.touching_pair(solution))
+        return proven
+
+    def _refute(self, found: Evaluated, team: IntArray, bodies: str) -> None:
+        """Count one more collision of the robots that touch, or of all if none are named."""
+        own = [self._robots[name] for name in bodies.split(PAIR)] if bodies else []
+        touching = sorted({robot for robot in own if robot >= 0})
+        if len(touching) == 1 and len(own) == 2:  # with an obstacle, whoever the others are
+            robot = touching[0]
+            found.blocked[robot, team[robot]] += 1
+            self._raise(found, robot, team, found.costs.shape[1])
+            return
+        for pair, (a, b) in enumerate(combinations(range(len(team)), 2)):
+            if not touching or (a in touching and b in touching):
+                found.collisions[pair, team[a], team[b]] += 1
+                self._raise(found, a, team, 1)
+                self._raise(found, b, team, 1)
+
+    def _raise(self, found: Evaluated, robot: int, team: IntArray, hits: int) -> None:
+        """Raise C1 of a team's member, and its cost with it."""
+        found.criteria[robot, 0, team[robot]] += hits
+        found.costs[robot, team[robot]] += self._planner.objective.collision_weight * hits

@@ -1,23 +1,95 @@
-"""Breeding and measuring co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
+"""Co-evolving populations, measured all against all, and their teams (Curkovic et al. 2013).
 
-from typing import NamedTuple
+A team is one individual of every population: its paths are executed together.
+"""
+
+from itertools import combinations
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
 from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
-from evoexp.evolution.best_team import CollisionCounts
-from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
+from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.hall_of_fame import Hall, HallRules, rate_team, renew_hall
+from evoexp.evolution.operators.breeding import Breeding
 from evoexp.evolution.pareto import pareto_front
-from evoexp.evolution.succession import choose_elites, copy_members
+from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions
-from evoexp.planners.coevolution.teams import Evaluated
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 HALF_TURN = DEGREE * 180.0  # [rad] genes live in [0, π)
+
+
+class Evaluated(NamedTuple):
+    """Populations evaluated all against all."""
+
+    costs: FloatArray  # (robots, individuals) C1 + C2 + C3 + C4, weighted
+    criteria: FloatArray  # (robots, 4, individuals) C1 … C4
+    own: FloatArray  # (robots, individuals) C2 + C3 + C4, weighted
+    # (pairs of robots, individuals, individuals) colliding configurations
+    collisions: CollisionCounts
+    blocked: IntArray  # (robots, individuals) configurations that collide with obstacles
+
+    @classmethod
+    def room(cls, *shape: int) -> Self:
+        """Return memory for populations of a shape (…, robots, individuals)."""
+        *places, robots, count = shape
+        own, costs = np.empty((2, *shape))
+        pairs = np.empty((*places, robots * (robots - 1) // 2, count, count), dtype=np.int16)
+        blocked = np.zeros(shape, dtype=np.int64)
+        return cls(costs, np.empty((*places, robots, 4, count)), own, pairs, blocked)
+
+    @property
+    def teamable(self) -> FloatArray:
+        """(robots, individuals) own cost; inf for those that collide with an obstacle."""
+        return np.asarray(teamable_costs(self.own, self.blocked))
+
+    def team_of(self, individual: int) -> IntArray:
+        """Return the cheapest collision-free team (robots,) with an individual of the first robot.
+
+        Where there is none, everybody else is who collides least with that individual.
+        """
+        own = self.teamable.copy()
+        alone = own[0, individual]
+        own[0] = np.inf
+        own[0, individual] = alone
+        best = best_team(self.collisions, own)
+        if best.found:
+            return best.individuals
+        team = np.zeros(len(own), dtype=np.int64)
+        team[0] = individual
+        for other in range(1, len(own)):
+            team[other] = int(np.argmin(self.collisions[other - 1, individual]))
+        return team
+
+    def cost_of(self, team: IntArray) -> float:
+        """Return the summed own cost of a team (robots,); inf if it collides."""
+        hits, cost = rate_team(self.collisions, self.own, team)
+        return np.inf if hits or any(self.blocked[range(len(team)), team]) else cost
+
+    def terms_of(self, team: IntArray) -> dict[str, float]:
+        """Return C1 … C4 of every robot of a team, C1 against the team's other robots only."""
+        members = team.tolist()
+        met = [self.blocked.item(r, i) for r, i in enumerate(members)]
+        total = sum(met)
+        for pair, (a, b) in enumerate(combinations(range(len(members)), 2)):
+            hits = self.collisions.item(pair, members[a], members[b])
+            total, met[a], met[b] = total + hits, met[a] + hits, met[b] + hits
+        terms = {
+            "team_cost": float(sum(self.own.item(r, i) for r, i in enumerate(members))),
+            "team_collisions": float(total),
+        }
+        for r, individual in enumerate(members):
+            _, path, rotation, evenness = self.criteria[r, :, individual].tolist()
+            terms[f"collisions_robot_{r + 1}"] = float(met[r])
+            terms[f"tip_path_robot_{r + 1}"] = path
+            terms[f"rotation_robot_{r + 1}_rad"] = rotation
+            terms[f"tip_unevenness_robot_{r + 1}"] = evenness
+        return terms
 
 
 class Heredity(NamedTuple):
@@ -45,48 +117,11 @@ class LineTask(NamedTuple):
 
 
 @kernel
-def breed_robots(
-    select: Select,
-    cross: Cross,
-    mutate: Mutate,
-    # (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation
-    uniforms: FloatArray,
-    index: int,  # of the present generation
-    rate: float,  # probability that an allele of an individual is mutated (Eq. 10)
-    populations: FloatArray,  # (robots, genes, individuals)
-    costs: FloatArray,  # (robots, individuals)
-    # (teams, robots) members of the hall, −1: none; written: their places in the next populations
-    teams: IntArray,
-    heredity: Heredity,
-    bred: FloatArray,  # like populations, written
-) -> None:
-    """Write the next populations: offspring, then elites, then members of the hall, unchanged."""
-    num_elites, elites = heredity.num_elites, np.empty(heredity.num_elites, dtype=np.int64)
-    rules, normals, row = heredity.breeding, np.empty((0, 0)), 0
-    for robot in range(len(populations)):
-        held = count_members(teams, robot)
-        count = populations.shape[2] - num_elites - held
-        members = teams[:held, robot].copy()
-        for k in range(held):
-            teams[k, robot] = count + num_elites + k
-        if not heredity.moving[robot]:
-            bred[robot] = populations[robot]
-            continue
-        parents = np.empty(count, dtype=np.int64)
-        draws, genes, before = uniforms[row], bred[robot], populations[robot]
-        own, row = costs[robot], row + 1
-        breed(
-            select, cross, mutate, draws, normals, index, rate, rules, own, before, parents, genes
-        )
-        # elites and members of the hall, untouched
-        choose_elites(own, elites)
-        copy_members(before, elites, genes, count)
-        copy_members(before, members, genes, count + num_elites)
-
-
-@kernel
 def count_members(teams: IntArray, robot: int) -> int:
-    """Return how many individuals of a robot's population the hall (teams, robots) holds."""
+    """Return how many individuals of a robot's population the hall (teams, robots) holds.
+
+    −1 stands for none, at the end.
+    """
     held = 0
     while held < len(teams) and teams[held, robot] >= 0:
         held += 1
@@ -94,21 +129,18 @@ def count_members(teams: IntArray, robot: int) -> int:
 
 
 @kernel
-def copy_fronts(
-    populations: FloatArray,  # (robots, genes, individuals)
-    criteria: FloatArray,  # (robots, criteria, individuals), all minimised
-    costs: FloatArray,  # (robots, individuals)
-    heredity: Heredity,  # the hall and its rules
-) -> int:
+def copy_fronts(populations: FloatArray, judged: Evaluated, heredity: Heredity) -> int:
     """Let the hall hold the front of each population, the cheapest if it has too few places.
 
     "The Pareto front is copied to the next generation. The size of the front is limited"
-    (section 3). A population whose front is smaller has members −1 at the end.
+    (section 3). Populations are (robots, genes, individuals). Where a front is smaller than
+    others, members −1 stand at the end.
 
     Returns:
         Number of rows of the hall that are used.
     """
-    teams, fronts, used = heredity.hall.teams, np.empty(costs.shape, dtype=np.bool_), 0
+    criteria, costs, teams, used = judged.criteria, judged.costs, heredity.hall.teams, 0
+    fronts = np.empty(costs.shape, dtype=np.bool_)
     for robot in range(len(populations)):
         fronts[robot] = pareto_front(criteria[robot])
     if heredity.by_genome:
@@ -128,9 +160,7 @@ def copy_fronts(
 @kernel
 def renew(
     populations: FloatArray,  # (robots, genes, individuals)
-    criteria: FloatArray,  # (robots, criteria, individuals), all minimised
-    collisions: CollisionCounts,
-    own: FloatArray,
+    judged: Evaluated,  # of them
     best: IntArray,  # (robots,) the best team; −1 if there is none
     num_teams: int,  # teams of the hall at present
     heredity: Heredity,  # the hall and its rules
@@ -139,12 +169,10 @@ def renew(
 
     Members of the fronts are offered with their best collaborators. With distinct genomes the best
     team of the generation is offered as it is, so that it is never lost; and a robot that stands
-    still, which has one genome, may be in all teams.
-
-    Returns:
-        Number of teams that the hall holds then.
+    still, which has one genome, may be in all teams. Returns how many teams the hall holds then.
     """
-    hall = heredity.hall
+    hall, criteria, collisions = heredity.hall, judged.criteria, judged.collisions
+    own = teamable_costs(judged.own, judged.blocked)
     fronts = np.empty(own.shape, dtype=np.bool_)
     for robot in range(len(populations)):
         fronts[robot] = pareto_front(criteria[robot])
@@ -163,11 +191,9 @@ def merge_copies(
 ) -> None:
     """Let the first of equal genomes stand for all of them, and offer the hall's members again.
 
-    Args:
-        populations: (robots, genes, individuals).
-        marks: (robots, individuals) a number that equal genomes have in common, to find them by.
-        teams: (teams, robots) members of the hall, rewritten.
-        fronts: (robots, individuals) changed: copies leave them, members of the hall join them.
+    `marks` (robots, individuals) are numbers that equal genomes have in common. `teams` (teams,
+    robots) are rewritten; copies leave the fronts (robots, individuals), members of the hall join
+    them.
     """
     mark = np.empty(populations.shape[2])
     for robot in range(len(populations)):
@@ -262,11 +288,8 @@ def evaluate_lines(
 ) -> bool:
     """Evaluate everybody against everybody of the other robots, where robots are lines (Eq. 4).
 
-    One call does what `Coevolution.evaluated` does step by step with other models; between the
-    steps Python would take a third of the time.
-
-    Returns:
-        False if a coordinate is not finite.
+    One call does what `Coevolution.evaluated` does step by step with other models. Returns False if
+    a coordinate is not finite.
     """
     costs, criteria, own, collisions = found.costs, found.criteria, found.own, found.collisions
     robots, genes, count = populations.shape
@@ -293,3 +316,43 @@ def evaluate_lines(
             criteria[r, 0, k] = sums[r, k]
             costs[r, k] = task.collision_weight * sums[r, k] + own[r, k]
     return True
+
+
+@kernel
+def survey(found: Evaluated, team: IntArray, summary: FloatArray) -> float:
+    """Write the best team (robots,), −1 if there is none, and a summary; return the team's cost.
+
+    The summary: index of the best individual of all populations, mean and deviation of all costs,
+    and how many of the first robot have a collision-free partner in every population.
+    """
+    teamable = teamable_costs(found.own, found.blocked)
+    best = best_team(found.collisions, teamable)
+    team[:] = best.individuals
+    summary[0], summary[1], summary[2] = cost_statistics(found.costs.reshape(-1))
+    summary[3] = count_partnered(found.collisions, found.blocked)
+    return best.cost
+
+
+@kernel
+def teamable_costs(own: FloatArray, blocked: IntArray) -> FloatArray:
+    """Return own costs (robots, individuals); inf of those that collide with an obstacle."""
+    teamable = np.empty(own.shape)
+    for r in range(len(own)):
+        for k in range(own.shape[1]):
+            teamable[r, k] = np.inf if blocked[r, k] > 0 else own[r, k]
+    return teamable
+
+
+@kernel
+def count_partnered(collisions: CollisionCounts, blocked: IntArray) -> int:
+    """Count the individuals of the first robot with a collision-free partner everywhere."""
+    count = 0
+    for i in range(blocked.shape[1]):
+        partnered = blocked[0, i] == 0
+        for other in range(1, len(blocked)):
+            row, found = collisions[pair_index(len(blocked), 0, other), i], False
+            for j in range(blocked.shape[1]):
+                found |= (row[j] == 0) & (blocked[other, j] == 0)
+            partnered &= found
+        count += 1 if partnered else 0
+    return count

@@ -23,13 +23,16 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
-from evoexp.planners.answers import of_limits, of_place
-from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.generations import NOT_FINITE, TeamSearch
-from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, evaluate_lines, measure
-from evoexp.planners.coevolution.proven_teams import ProvenTeams
-from evoexp.planners.coevolution.settings import CoevolutionSettings
-from evoexp.planners.coevolution.teams import Evaluated
+from evoexp.planners.answers import in_shape, of_limits, of_place
+from evoexp.planners.coevolution.generations import NOT_FINITE, ProvenTeams, TeamSearch
+from evoexp.planners.coevolution.kernels import (
+    HALF_TURN,
+    Evaluated,
+    LineTask,
+    evaluate_lines,
+    measure,
+)
+from evoexp.planners.coevolution.settings import CoevolutionSettings, SpeedLimit, length_notes
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, BoolArray, FloatArray
@@ -54,10 +57,7 @@ class Problem(NamedTuple):
 
 
 class Coevolution(PlannerDefaults, Component):
-    """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
-
-    Methods I–VIII are settings of it.
-    """
+    """The algorithm of Curkovic et al., sections 2 and 3; Methods I–VIII are settings of it."""
 
     component: ClassVar[str] = "coevolution"
     revision: ClassVar[int] = 2
@@ -79,12 +79,9 @@ class Coevolution(PlannerDefaults, Component):
 
     @model_validator(mode="after")
     def _genes_come_in_pairs(self) -> Self:
-        if self.chromosome_length < 2 or self.chromosome_length % 2:
-            raise SettingError(
-                "chromosome_length",
-                "even and at least 2: two link angles per configuration",
-                self.chromosome_length,
-            )
+        fits = self.chromosome_length >= 2 and self.chromosome_length % 2 == 0
+        must = "even and at least 2: two link angles per configuration"
+        self.demand("chromosome_length", fits, must)
         return self
 
     @property
@@ -97,9 +94,8 @@ class Coevolution(PlannerDefaults, Component):
         assembly = robot.build()
         collision = self.collision.bind(assembly, scenario.obstacles)
         if len(collision.arms) < 2:
-            raise SettingError(
-                "robot", "two robots or more, which evolve together", len(collision.arms)
-            )
+            must = "two robots or more, which evolve together"
+            raise SettingError("robot", must, len(collision.arms))
         arms = np.array([(*arm.base, *arm.lengths) for arm in collision.arms])
         start, goal = (DEGREE * ends for ends in scenario.ends(arms[:, :2], arms[:, 2:]))
         moving = np.array([r not in scenario.stationary for r in range(len(arms))])
@@ -121,10 +117,7 @@ class Coevolution(PlannerDefaults, Component):
         return self.ga.population_size
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return populations of uniform genes, (robots, 2 K, count).
-
-        Robots that stand still keep their posture.
-        """
+        """Return populations of uniform genes, (robots, 2 K, count), of robots that move."""
         shape = len(problem.start), 2 * self.num_configurations, count
         return self.populations_of(problem, rng.random(shape))
 
@@ -136,11 +129,7 @@ class Coevolution(PlannerDefaults, Component):
         return genes
 
     def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
-        """Evaluate everybody of populations against everybody of the other robots (Eq. 4).
-
-        Args:
-            populations: (robots, 2 K, individuals).
-        """
+        """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
         collision, objective = problem.collision, self.objective
         robots, _, count = populations.shape
         if collision.is_lines:
@@ -215,10 +204,8 @@ class Coevolution(PlannerDefaults, Component):
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the criteria of every robot of one team, and the demands of the executed curve.
 
-        Returns:
-            C1 … C4 (C1 against the team's other robots only), the distance by which the curve
-            leaves the range [0, π] of link angles, and the largest turn of a link per sampling
-            step, at the curve's fastest instant.
+        These are the distance by which it leaves the range [0, π] of link angles, and the largest
+        turn of a link per sampling step. C1 is against the team's other robots only.
         """
         paths = DEGREE * self._paths(problem, solution)
         ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])
@@ -252,9 +239,8 @@ class Coevolution(PlannerDefaults, Component):
     def notes(self, problem: Problem) -> list[str]:
         """Compare the chromosome's length with Eqs. 2 and 3, line by line."""
         lengths = [arm.lengths for arm in problem.collision.arms]
-        return length_notes(
-            self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length
-        )
+        task = lengths, problem.start, problem.goal
+        return length_notes(self.speed_limit, *task, self.chromosome_length)
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of all pairs of individuals, and of everybody's path and outlines."""
@@ -268,10 +254,7 @@ class Coevolution(PlannerDefaults, Component):
         return ((self.num_configurations + 2, 2),) * len(problem.start)
 
     def _paths(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        shape = (len(problem.start), self.num_configurations + 2, 2)
-        if solution.shape != (int(np.prod(shape)),):
-            raise ValueError(f"a solution has {int(np.prod(shape))} values, was {solution.shape}")
-        return solution.reshape(shape)
+        return in_shape(solution, len(problem.start), self.num_configurations + 2, 2)
 
     def _curve(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the executed curve, in absolute link angles [rad]."""

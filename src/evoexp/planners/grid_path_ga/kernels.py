@@ -48,11 +48,7 @@ def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
 
 
 class PathTable(TableSearch):
-    """A search whose tables keep the best path of each generation, and the results of all.
-
-    Attributes:
-        recorded: With a first axis of places; see `note`.
-    """
+    """A search whose tables keep the best path of each generation, and the results of all."""
 
     recorded: Population
 
@@ -94,10 +90,7 @@ def measure_all(
 
 @kernel
 def note(population: Population, place: int, recorded: Population, summaries: FloatArray) -> None:
-    """Write to a place what is recorded of a generation.
-
-    These are the results of all paths, the best path alone, and the summary: all paths are valid.
-    """
+    """Write to a place the results of all paths, the best path alone, and the summary."""
     results, summary = population.results, summaries[place]
     recorded.results[place] = results
     summary[0], summary[1], summary[2] = cost_statistics(results[COST])
@@ -171,8 +164,7 @@ def climb(
 ) -> int:
     """Regenerate a piece of one path after the other as mutation does; keep what costs no more.
 
-    Returns:
-        The number of the next trial: an earlier one than `last` if the draws did not suffice.
+    Returns the number of the next trial: below `last` if the draws did not suffice.
     """
     draws, world, population, candidate, scratch = borrowed(
         (draws, world, population, candidate, scratch)

@@ -131,8 +131,8 @@ def exchange_without_loops(
 ) -> None:
     """Exchange the remainders of two paths without loops at a site, and erase the loops.
 
-    A loop begins in a head and ends in a tail, at a site. Erasing loops one by one leaves the head
-    up to the first node that the tail passes, too, and the tail from there.
+    Erasing them leaves the head up to the first node that the tail passes, too, and the tail from
+    there.
     """
     # the first node of the first path's head among those of the second one's tail
     own = sites[site]
@@ -171,11 +171,7 @@ def _splice(head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray) 
 
 @kernel
 def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: NodeArray) -> int:
-    """Write the head of a path up to i, the node `link` if it is one, another's tail from j.
-
-    Returns:
-        The number of nodes written.
-    """
+    """Write a path's head up to i, `link` if one, another's tail from j; return the count."""
     count, left = i, int(tail[0] - j + 1)
     copy_part(head, 1, joined, 1, i)
     if link >= 0:
@@ -187,14 +183,11 @@ def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: N
 
 @kernel
 def coincident_sites(one: NodeArray, two: NodeArray, seen: IntArray, sites: IntArray) -> int:
-    """Write the places of common nodes but start and goal into `sites` (nodes + 1,).
+    """Write the places of common nodes but start and goal into `sites`; return how many there are.
 
     Of a node that the first path passes several times, the last time counts. A site is one number:
-    the place in the first path is in front of the lowest `PLACE_BITS`, that in the second in them.
-    Sites ascend by the latter.
-
-    `seen` needs not be cleared between searches; both are described in `Scratch`.
-    Returns the number of sites.
+    the place in the first path in front of the lowest `PLACE_BITS`, that in the second in them;
+    sites ascend by the latter. `seen` needs not be cleared between searches; see `Scratch`.
     """
     search = seen[-1] + (1 << PLACE_BITS)
     seen[-1] = search
@@ -212,10 +205,7 @@ def coincident_sites(one: NodeArray, two: NodeArray, seen: IntArray, sites: IntA
 def near_sites(
     draws: Block, coordinates: NodeArray, one: NodeArray, two: NodeArray, reach: int
 ) -> tuple[int, int]:
-    """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate.
-
-    Returns their places in both paths; (0, 0) if there is no such pair.
-    """
+    """Draw a pair of places where two paths are at most `reach` apart; (0, 0): there is none."""
     # how many pairs there are
     num = 0
     for k in range(2, two[0]):
@@ -254,11 +244,7 @@ def _near(coordinates: NodeArray, one: int, two: int, reach: int) -> bool:
 
 @kernel
 def connection(draws: Block, neighbours: NodeArray, one: int, two: int) -> int:
-    """Return a node between two others, drawn among all that moves join to both.
-
-    Returns:
-        The node; `CONNECTED` if a move joins the two themselves, `NOT_CONNECTED` if there is none.
-    """
+    """Return a node between two others, drawn among all; else `CONNECTED` or `NOT_CONNECTED`."""
     # how many nodes are between
     count = 0
     for move in range(neighbours.shape[1]):

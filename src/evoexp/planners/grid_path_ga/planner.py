@@ -1,10 +1,8 @@
 """Safe paths over a grid by a genetic algorithm on paths of any length.
 
-Chen & Zalzala 1995, section 2. Every individual is a path of neighbouring nodes from start to goal.
-It is valid by construction: random walks make permitted moves, and crossover and mutation join such
-walks.
-Its cost is the weighted sum of its length and the mean unsafeness of its nodes, which a wave front
-from the obstacles gives.
+Chen & Zalzala 1995, section 2. Every individual is a path of neighbouring nodes from start to goal,
+valid by construction: random walks make permitted moves, and crossover and mutation join them. Its
+cost is the weighted sum of its length and the mean unsafeness of its nodes.
 
 A population is a table of whole numbers, see `paths.grid_walks`; a solution is flat: the
 coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
@@ -16,14 +14,15 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
-from evoexp.collision.scene import Scene, scene
+from evoexp.collision.scene import Part, Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all
-from evoexp.paths.grids import UNREACHED, Moves, NodeArray, spread_front
+from evoexp.paths.grids import UNREACHED, Grid, Moves, NodeArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels
@@ -38,7 +37,6 @@ from evoexp.planners.grid_path_ga.kernels import (
     solution_of,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
-from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
@@ -125,10 +123,8 @@ class GridPathGa(PlannerDefaults, Component):
 
     def cost(self, problem: Problem, population: np.ndarray) -> JudgementArrays:
         """Judge paths (individuals, longest + 1), which are valid by construction."""
-        if (
-            population.ndim != 2
-            or not 1 <= population[:, 0].min() <= population[:, 0].max() < population.shape[1]
-        ):
+        sizes = population[..., 0]
+        if population.ndim != 2 or not 1 <= sizes.min() <= sizes.max() < population.shape[1]:
             raise ValueError(f"paths must be (individuals, longest + 1), was {population.shape}")
         distance, unsafeness, cost = self.measured(problem, population)
         terms = {"distance": distance, "unsafeness": unsafeness, "num_nodes": population[:, 0]}
@@ -157,9 +153,8 @@ class GridPathGa(PlannerDefaults, Component):
         are_nodes = ((nodes == np.floor(nodes)) & (nodes >= 0) & (nodes <= last)).all(axis=1)
         if not are_nodes.all():
             k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
-            raise SettingError(
-                f"path[{k}]", f"a node of the grid, whole numbers ({inside})", nodes[k].tolist()
-            )
+            must = f"a node of the grid, whole numbers ({inside})"
+            raise SettingError(f"path[{k}]", must, nodes[k].tolist())
         indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
         path = np.array([len(nodes), *indices], dtype=np.int32)
         made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
@@ -181,9 +176,8 @@ class GridPathGa(PlannerDefaults, Component):
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Name the faults that `evaluate` counts: ends, blocked nodes, forbidden moves."""
         terms = self.evaluate(problem, solution)
-        return [
-            f"{name.replace('_', ' ')}: {terms[name]:.0f}" for name in FAULTS if terms[name] > 0.0
-        ]
+        present = [name for name in FAULTS if terms[name] > 0.0]
+        return [f"{name.replace('_', ' ')}: {terms[name]:.0f}" for name in present]
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of the paths of a call, each as long as there are nodes."""
@@ -206,7 +200,7 @@ class _Search(PathTable, ScaledSearch):
         ScaledSearch.__init__(self, ga, PER_CALL, BLOCK)
         self.make_table(problem.world, size)
         self._planner, self._problem = planner, problem
-        self._table = Population(
+        self.table = Population(
             np.empty((KEPT, size, nodes + 1), dtype=np.int32), np.empty((KEPT, RESULTS, size))
         )
         breeding = Breeding(
@@ -220,30 +214,25 @@ class _Search(PathTable, ScaledSearch):
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
-        paths, results = self._table.paths[0], self._table.results[0]
+        paths, results = present = self.at(0)
         drawn = self._planner.sample(self._problem, rng, len(paths))
         paths[:, : drawn.shape[1]] = drawn
         results[:] = self._planner.measured(self._problem, paths)
-        kernels.note(Population(paths, results), 0, self.recorded, self.summaries)
+        self.note(present, 0)
 
-    def breed(self, generation: int) -> bool:
-        """Compute the generation behind one, and note what is recorded of it."""
-        paths, results = self._table
-        present, following = (
-            Population(paths[g % KEPT], results[g % KEPT]) for g in (generation, generation + 1)
-        )
-        populations, world = (present, following), self._problem.world
-        suffices = kernels.advance(
-            self.draws.block, world, *self._settings, *populations, self.chosen, self._scratch
-        )
-        if suffices:
-            place = (generation + 1) % self.num_places
-            kernels.note(following, place, self.recorded, self.summaries)
-        return bool(suffices)
+    def breed(self, present: Population, following: Population) -> bool:
+        """Write the population that follows another."""
+        rules, populations = self._settings, (present, following)
+        task = self.draws.block, self._problem.world
+        return bool(kernels.advance(*task, *rules, *populations, self.chosen, self._scratch))
+
+    def note(self, population: Population, place: int) -> None:
+        """Write the record of a generation to a place."""
+        kernels.note(population, place, self.recorded, self.summaries)
 
     def population(self, index: int) -> NodeArray:
         """Return the paths of one of the generations computed last, without rests of rows."""
-        paths: NodeArray = self._table.paths[index % KEPT]
+        paths: NodeArray = self.at(index).paths
         return trimmed(paths) if index > self.reached - KEPT else paths[:0]
 
 
@@ -262,9 +251,8 @@ def _prepared(
 ) -> Problem:
     """Prepare a problem, kept for planners that differ in weights and rates alone."""
     if robot.dimensions != len(scenario.size):
-        raise SettingError(
-            "robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions
-        )
+        must = f"as many as the grid has ({len(scenario.size)})"
+        raise SettingError("robot.dimensions", must, robot.dimensions)
     fields, margin = collision.bind(scenario.blocked()), scenario.security_margin
     bodies, between = scene(robot.build(), scenario.bodies()), "obstacles"
     if acceptance != "model":
@@ -274,17 +262,13 @@ def _prepared(
     start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
     for name, node in (("start", start), ("goal", goal)):
         if not own.free.flat[node]:
-            must = (
-                "a node of an unsafeness of at most collision.max_unsafeness "
-                f"({collision.max_unsafeness:g})"
-            )
+            must = "a node of an unsafeness of at most collision.max_unsafeness "
+            must += f"({collision.max_unsafeness:g})"
             raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
     steps = fields.steps_to(goal)
     if steps[start] == UNREACHED:
-        must = (
-            f"a node that can be reached from the start {list(scenario.start)}; "
-            f"{between} are between"
-        )
+        must = f"a node that can be reached from the start {list(scenario.start)}; "
+        must += f"{between} are between"
         raise SettingError("scenario.goal", must, list(scenario.goal))
     world = World(
         own.neighbours,
@@ -305,10 +289,7 @@ def _prepared(
 
 
 def _weigh_moves(fields: Fields) -> SumArray:
-    """Return the sums of the weights of moves toward every node, (targets, nodes, moves).
-
-    There are no targets on large grids, nor where the sums are no whole numbers of 8 bits.
-    """
+    """Return `weigh_all` toward every node; none of large grids, or where 8 bits hold no sum."""
     grid, potentials = fields.grid, fields.potentials
     nodes, moves = grid.neighbours.shape
     tables = np.empty((nodes if nodes <= FEW_NODES else 0, nodes, moves), dtype=np.uint8)
@@ -321,3 +302,43 @@ def _weigh_moves(fields: Fields) -> SumArray:
         if not np.array_equal(table, sums):
             return tables[:0]
     return tables
+
+
+def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: bool) -> Grid:
+    """Return a grid without the moves that the certifier does not prove, in either direction.
+
+    A length unit lies between its nodes. With `by_margin` moves must keep the security margin.
+    """
+    neighbours = grid.neighbours.copy()
+
+    def judge(line: NodeArray, move: int) -> None:
+        """Forbid the moves of a line of nodes that are not proven."""
+        ends = Motion(grid.coordinates[line[[0, -1]]].astype(np.float64))
+        if is_proven((Part(scene, 0, 1),), ends, security_margin, by_margin):
+            return
+        if len(line) > 2:
+            middle = len(line) // 2
+            judge(line[: middle + 1], move)
+            judge(line[middle:], move)
+            return
+        neighbours[line[0], move] = -1
+        neighbours[line[1], neighbours[line[1]] == line[0]] = -1
+
+    for move, targets in enumerate(grid.neighbours.T):
+        # moves to nodes of greater index; the others are their ways back
+        first = np.flatnonzero(targets >= 0)[:1]
+        if len(first) and targets[first[0]] > first[0]:
+            for line in _lines(targets):
+                judge(line, move)
+    return grid._replace(neighbours=neighbours)
+
+
+def _lines(targets: NodeArray) -> Iterator[NodeArray]:
+    """Yield the nodes of each longest line of one move, which leads to `targets` (nodes,) or −1."""
+    is_target = np.zeros(len(targets), dtype=bool)
+    is_target[targets[targets >= 0]] = True
+    for node in np.flatnonzero((targets >= 0) & ~is_target):
+        line = [int(node)]
+        while targets[line[-1]] >= 0:
+            line.append(int(targets[line[-1]]))
+        yield np.array(line, dtype=np.int32)

@@ -22,7 +22,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import of_limits
+from evoexp.planners.answers import in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Coding, Population
@@ -69,9 +69,8 @@ class PlacementGa(PlannerDefaults, Component):
 
     @model_validator(mode="after")
     def _has_no_motion(self) -> Self:
-        if self.acceptance != "model":
-            must = "'model': the answer is a posture, there is no motion to prove"
-            raise SettingError("acceptance", must, self.acceptance)
+        must = "'model': the answer is a posture, there is no motion to prove"
+        self.demand("acceptance", self.acceptance == "model", must)
         return self
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
@@ -79,10 +78,8 @@ class PlacementGa(PlannerDefaults, Component):
         check_range("planner.angle_range", self.angle_range)
         reach = sum(robot.link_lengths)
         if abs(scenario.target[1]) > reach:
-            must = (
-                f"within the arm's reach: Y_e between −{reach:g} and {reach:g} (the links' "
-                "lengths together)"
-            )
+            must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "
+            must += "(the links' lengths together)"
             raise SettingError("scenario.target", must, list(scenario.target))
         task = Task(*robot.link_lengths, *scenario.target, *scenario.force)
         avoided = self.objective.avoided(scenario.obstacle_points())
@@ -121,12 +118,8 @@ class PlacementGa(PlannerDefaults, Component):
         return Coding(*coding, ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
-        """Return the posture of a solution as a motion that stays there; None if it is infeasible.
-
-        The algorithm finds a posture, and no way to it. The bodies of the posture are judged by
-        their exact distances.
-        """
-        branch, own, _ = problem.model.posture(*_two(solution))
+        """Return the posture as a motion that stays there; None: it is infeasible."""
+        branch, own, _ = problem.model.posture(*in_shape(solution, GENES))
         if branch < 0:
             return None
         q = np.array([own[PLATFORM], *(DEGREE * np.array([*solution, own[THETA_3]]))])
@@ -135,10 +128,9 @@ class PlacementGa(PlannerDefaults, Component):
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return all numbers of both values of θ3, those of the worse one as `other_…`.
 
-        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. Out of
-        reach, θ3, X_p and the torques are NaN, criteria and cost E_m.
+        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible.
         """
-        branch, *both = problem.model.posture(*_two(solution))
+        branch, *both = problem.model.posture(*in_shape(solution, GENES))
         one, two = solution.tolist()
         named = {"branch": float(branch), "theta_1_deg": one, "theta_2_deg": two}
         for prefix, numbers in zip(BRANCHES, both, strict=True):
@@ -152,8 +144,8 @@ class PlacementGa(PlannerDefaults, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare θ1 and θ2 with their limits, and ask for a θ3 that reaches the target."""
-        angles = _two(solution)
-        beyond = of_limits(["θ1", "θ2"], np.array(angles)[:, None], problem.angle_limits, "deg")
+        angles = in_shape(solution, GENES)
+        beyond = of_limits(["θ1", "θ2"], angles[:, None], problem.angle_limits, "deg")
         is_feasible = problem.model.posture(*angles)[0] >= 0
         return beyond + ([] if is_feasible else ["no θ3 reaches the target within all limits"])
 
@@ -174,41 +166,37 @@ class _Search(ScaledSearch):
         super().__init__(ga, PER_CALL, BLOCK)
         self._planner, self._problem = planner, problem
         self._judging = planner.strings_of(problem), problem.model
-        self._table = Population(
+        self.table = Population(
             np.empty((self.num_places, GENES, size), dtype=np.int64),
             np.empty((self.num_places, ROWS, size)),
         )
-        self.costs = self._table.rows[:, FIRST_CRITERION]
+        self.costs = self.table.rows[:, FIRST_CRITERION]
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
-        strings, rows = self._table.strings[0], self._table.rows[0]
+        strings, rows = present = self.at(0)
         strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
         kernels.judge(strings, *self._judging, strings.shape[1], rows)
-        kernels.summarise_rows(rows, self.summaries[0])
+        self.note(present, 0)
 
-    def breed(self, generation: int) -> bool:
-        """Compute the generation behind one, and summarise it."""
-        (strings, rows), num = self._table, self.num_places
-        present, following = (
-            Population(strings[g % num], rows[g % num]) for g in (generation, generation + 1)
-        )
-        suffices = kernels.advance(
-            self.draws.block, *self._judging, present, following, self.chosen
-        )
-        if suffices:
-            kernels.summarise_rows(following.rows, self.summaries[(generation + 1) % num])
-        return bool(suffices)
+    def breed(self, present: Population, following: Population) -> bool:
+        """Write the population that follows another."""
+        draws, chosen = self.draws.block, self.chosen
+        return bool(kernels.advance(draws, *self._judging, present, following, chosen))
+
+    def note(self, population: Population, place: int) -> None:
+        """Summarise a generation at a place."""
+        kernels.summarise_rows(population.rows, self.summaries[place])
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return angles, criteria and whether the posture is feasible."""
-        angles = self._table.rows[place, :GENES, individual].copy()
-        _, *criteria, branch = self._table.rows[place, FIRST_CRITERION:, individual].tolist()
+        angles = self.table.rows[place, :GENES, individual].copy()
+        _, *criteria, branch = self.table.rows[place, FIRST_CRITERION:, individual].tolist()
         return Candidate(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
 
     def population(self, index: int) -> IntArray:
         """Return the strings."""
-        return np.asarray(self._table.strings[index % self.num_places])
+        return np.asarray(self.at(index).strings)
 
 
 @lru_cache(maxsize=32)
@@ -216,9 +204,3 @@ def _built(robot: MobileArm, scenario: Docking) -> tuple[Assembly, Scene]:
     """Build the robot and its scene, kept for planners that differ in weights and rates alone."""
     assembly = robot.build()
     return assembly, scene(assembly, scenario.obstacles, self_pairs=True)
-
-
-def _two(solution: FloatArray) -> tuple[float, float]:
-    if solution.shape != (GENES,):
-        raise ValueError(f"a solution has {GENES} values, was {solution.shape}")
-    return float(solution[0]), float(solution[1])

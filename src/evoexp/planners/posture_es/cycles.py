@@ -112,12 +112,7 @@ class Search:
         self._settle(chosen, winner)
 
     def _settle(self, chosen: IntArray, winner: int) -> None:
-        """Take over the selected parents, and the winner or else the best if it is better.
-
-        Args:
-            chosen: Of `kernels.select`: below n offspring, from n on parents.
-            winner: The offspring that meets the goal at the least cost; −1: nobody does.
-        """
+        """Take over the parents that `kernels.select` chose, and the winner, or a better best."""
         memory, nodes, origin = self._memory, self._nodes, self._memory.origin
         offspring, count = memory.offspring, memory.offspring.shape[1]
         self.costs, self.won = memory.rows[COST].copy(), winner >= 0

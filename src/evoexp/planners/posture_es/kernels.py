@@ -148,10 +148,7 @@ def judge(
 
 @kernel
 def judge_edges(parents: FloatArray, num_between: int, judging: Judging, memory: Memory) -> None:
-    """Mark children as infeasible that an infeasible configuration separates from their parent.
-
-    Tested are `num_between` configurations between it, one of `parents` (nq, any), and the child.
-    """
+    """Mark children as infeasible that an infeasible configuration separates from their parent."""
     offspring, origin, feasible = memory.offspring, memory.origin, memory.feasible
     nq, count = offspring.shape
     between = np.empty((nq, count * num_between))
@@ -251,10 +248,8 @@ def advance(
 ) -> tuple[IntArray, int]:
     """Breed, judge and select one cycle.
 
-    Returns:
-        Indices of the next parents, the best first: below n offspring, from n on parents (none: all
-        parents stay); index of the winner, which meets the goal at the least cost, −1 if nobody
-        does.
+    Returns the next parents, the best first: below n offspring, from n on parents (none: all stay);
+    and the winner, which meets the goal at the least cost, −1 if nobody does.
     """
     breed(uniforms, normals, num_bred, strategy, members, memory)
     judge(memory.offspring, judging, memory.rows, memory.feasible, memory.met)

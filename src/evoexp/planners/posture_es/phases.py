@@ -1,7 +1,6 @@
 """The phases of a task: goals, held objects, permitted contacts, and the bodies of each phase.
 
-An object's place at the begin of a phase depends on the postures before; the rest is made once. A
-phase ends at the first posture that meets its goal, so a list of postures alone says which phase
+A phase ends at the first posture that meets its goal, so a list of postures alone says which phase
 each of them belongs to.
 """
 
@@ -16,7 +15,7 @@ from evoexp.collision.covers.body_covers import Cover
 from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.rotations import rotation_matrix
-from evoexp.objectives.posture_cost import DISTANCE, EDGED, POINT, ROD, ROUND, Aim, PostureCost
+from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim, PostureCost
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
 from evoexp.records import BoolArray, FloatArray
@@ -58,11 +57,6 @@ class Judged(NamedTuple):
         """The cost, (postures,)."""
         return np.asarray(self.rows[COST])
 
-    @property
-    def distance(self) -> FloatArray:
-        """Distance from the goal, also inside of a body, (postures,) [length unit]."""
-        return np.asarray(np.abs(self.rows[DISTANCE]))
-
 
 class Stage(NamedTuple):
     """One phase, begun."""
@@ -82,9 +76,7 @@ class Stage(NamedTuple):
     def judge(self, q: FloatArray) -> Judged:
         """Judge postures q (nq, postures) [rad]."""
         q = np.ascontiguousarray(q)
-        count = q.shape[1]
-        flags = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-        found = Judged(np.empty((ROWS, count)), *flags)
+        found = Judged(np.empty((ROWS, q.shape[1])), *np.empty((2, q.shape[1]), dtype=np.bool_))
         kernels.judge(q, self.judging, *found)
         return found
 
@@ -124,18 +116,14 @@ class Problem:
 
     def begin(self, index: int, q: FloatArray, situation: Situation) -> Stage:
         """Begin a phase at posture q (nq,); stages are kept, verdict and terms need them again."""
-        moved = situation.held >= 0 or not np.array_equal(
-            situation.poses, self.first_situation.poses
-        )
-        key = (index, situation.poses.tobytes(), situation.grasp.tobytes()) if moved else (index,)
-        if isinstance(self.phases[index].goal, ShiftGoal):
-            key = (*key, q.tobytes())
+        phase, (joint, local) = self.phases[index], self.tool
+        place = q.tobytes() if isinstance(phase.goal, ShiftGoal) else b""
+        key = index, situation.held, situation.poses.tobytes(), situation.grasp.tobytes(), place
         if key in self.memory:
             stage: Stage = self.memory[key]
             return stage
         if len(self.memory) > KEPT:
             self.memory.clear()
-        phase, (joint, local) = self.phases[index], self.tool
         controlled = (joint, situation.grasp if situation.held >= 0 else local)
         # the collision models of pairs that must not touch, and of those that may
         bodies, (obstacles, allowed, carried) = self.bodies, self.surroundings(phase, situation)
@@ -167,11 +155,9 @@ class Problem:
         situation, phase = stage.situation, stage.phase
         if phase.then == "attach":
             held = self.task.names.index(phase.object)
-            joint, _ = self.tool
-            frame = frame_pose(self.assembly.table, joint, IDENTITY, q)
-            return situation._replace(
-                held=held, grasp=compose(invert(frame), situation.poses[held])
-            )
+            frame = frame_pose(self.assembly.table, self.tool[0], IDENTITY, q)
+            grasp = compose(invert(frame), situation.poses[held])
+            return situation._replace(held=held, grasp=grasp)
         if phase.then == "detach":
             poses = situation.poses.copy()
             poses[situation.held] = frame_pose(self.assembly.table, *stage.controlled, q)
@@ -187,8 +173,8 @@ class Problem:
             judged = stage.judge(postures[first:].T)
             where = np.flatnonzero(judged.met)
             stop = first + int(where[0]) if len(where) else last
-            kept = slice(0, stop - first + 1)
-            own = Judged(judged.rows[:, kept], judged.feasible[kept], judged.met[kept])
+            count = stop - first + 1
+            own = Judged(judged.rows[:, :count], judged.feasible[:count], judged.met[:count])
             found.append(Span(stage, first, stop, own, bool(len(where))))
             if not len(where):
                 break
@@ -197,16 +183,10 @@ class Problem:
 
     def scene_of(self, stage: Stage) -> Scene:
         """Return the bodies of a phase, for the exact verdict."""
-        situation = stage.situation
-        key = (
-            "scene",
-            stage.phase.contacts,
-            situation.held,
-            situation.grasp.tobytes(),
-            situation.poses.tobytes(),
-        )
+        held, poses, grasp = stage.situation.held, stage.situation.poses, stage.situation.grasp
+        key = stage.phase.contacts, held, grasp.tobytes(), poses.tobytes()
         if key not in self.memory:
-            self.memory[key] = self.scene_in(stage.phase, situation)
+            self.memory[key] = self.scene_in(stage.phase, stage.situation)
         bodies: Scene = self.memory[key]
         return bodies
 
@@ -228,69 +208,46 @@ class Problem:
 
     def scene_in(self, phase: Phase, situation: Situation) -> Scene:
         """Return the bodies of a phase, for the exact verdict."""
-        assembly = self.assembly
-        items = list(assembly.geometry.geometryObjects)
-        geometry = pin.GeometryModel()
-        for item in items:
-            geometry.addGeometryObject(
-                pin.GeometryObject(item.name, item.parentJoint, 0, item.placement, item.geometry)
-            )
+        assembly, names = self.assembly, [*self.bodies.names, *self.task.names]
+        geometry, items = pin.GeometryModel(), assembly.geometry.geometryObjects
+        placed = [(item.parentJoint, item.placement, item.geometry) for item in items]
         hulls, obstacles = obstacle_hulls(self.task.objects), self.placed_obstacles(situation)
-        for k, (shape, placement) in enumerate(obstacle_shapes(obstacles, hulls)):
-            joint, where = 0, placement
+        pairs, first = list(self.bodies.sorted_pairs.judged), len(placed)
+        for k, (shape, place) in enumerate(obstacle_shapes(obstacles, hulls)):
             if k == situation.held:
                 joint, pose = self._held_pose(situation)
-                where = pin.SE3(pose[:9].reshape(3, 3), pose[9:])
-            geometry.addGeometryObject(
-                pin.GeometryObject(self.task.names[k], joint, 0, where, shape)
-            )
-        allowed = _allowed(phase)
-        pairs = list(self.bodies.sorted_pairs.judged)
-        touching: list[AllowedContact] = []
-        for k in range(len(self.task.names)):
-            if k == situation.held:
-                others = [len(items) + j for j in range(len(self.task.names)) if j != k]
+                placed.append((joint, pin.SE3(pose[:9].reshape(3, 3), pose[9:]), shape))
+                others = [first + j for j in range(len(self.task.names)) if j != k]
                 watched = [*self._apart_from_tool(), *others]
-                pairs += [(body, len(items) + k) for body in watched]
             else:
-                pairs += [
-                    (body, len(items) + k)
-                    for body, item in enumerate(items)
-                    if item.parentJoint > 0
-                ]
-        names = [item.name for item in geometry.geometryObjects]
+                placed.append((0, place, shape))
+                watched = self._moving
+            pairs += [(body, first + k) for body in watched]
+        for name, (joint, place, shape) in zip(names, placed, strict=True):
+            geometry.addGeometryObject(pin.GeometryObject(name, joint, 0, place, shape))
+        contacts = []
         for a, b in pairs:
-            if frozenset((names[a], names[b])) in allowed:
-                touching.append(AllowedContact(a, b, self.allowed_penetration))
+            if _are_among(phase, names[a], names[b]):
+                contacts.append(AllowedContact(a, b, self.allowed_penetration))
             else:
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
         scene = geometry_scene(assembly.model, geometry, assembly.table)
-        return scene._replace(contacts=tuple(touching))
+        return scene._replace(contacts=tuple(contacts))
 
     def surroundings(
         self, phase: Phase, situation: Situation
     ) -> tuple[ObstacleTable, tuple[tuple[int, int], ...], Carried | None]:
         """Return the obstacles, the pairs (body, obstacle) that may touch, the carried object."""
-        names, bodies = self.task.names, self.bodies.names
-        allowed = _allowed(phase)
-        held = situation.held
-        left = [k for k in range(len(names)) if k != held]
-        table = self.placed_obstacles(situation)
+        names, bodies, held = self.task.names, self.bodies.names, situation.held
+        left, table = [k for k in range(len(names)) if k != held], self.placed_obstacles(situation)
         table = ObstacleTable(*(np.ascontiguousarray(column[left]) for column in table))
-        own = len(bodies)
-        numbers = {name: k for k, name in enumerate(bodies)} | (
-            {names[held]: own} if held >= 0 else {}
-        )
-        moving = {
-            k
-            for k, item in enumerate(self.assembly.geometry.geometryObjects)
-            if item.parentJoint > 0
-        } | {own}
+        moving = [(k, bodies[k]) for k in self._moving]
+        moving += [(len(bodies), names[held])] if held >= 0 else []
         ignored = tuple(
             (number, place)
-            for name, number in numbers.items()
+            for number, name in moving
             for place, k in enumerate(left)
-            if number in moving and frozenset((name, names[k])) in allowed
+            if _are_among(phase, name, names[k])
         )
         if held < 0:
             return table, ignored, None
@@ -299,10 +256,15 @@ class Problem:
             one._replace(start=_moved(pose, one.start), end=_moved(pose, one.end))
             for one in self.covers[held]
         )
-        watched = [
-            k for k in self._apart_from_tool() if frozenset((bodies[k], names[held])) not in allowed
-        ]
+        apart = self._apart_from_tool()
+        watched = [k for k in apart if not _are_among(phase, bodies[k], names[held])]
         return table, ignored, Carried(joint, cover, inner, tuple(watched))
+
+    @property
+    def _moving(self) -> list[int]:
+        """The bodies that a joint moves."""
+        items = self.assembly.geometry.geometryObjects
+        return [k for k, item in enumerate(items) if item.parentJoint > 0]
 
     def aim(
         self,
@@ -367,14 +329,12 @@ class Problem:
         ]
 
 
-def _allowed(phase: Phase) -> set[frozenset[str]]:
-    return {frozenset(pair) for pair in phase.contacts}
+def _are_among(phase: Phase, one: str, two: str) -> bool:
+    """Return whether two bodies may touch in a phase."""
+    return any({one, two} == set(pair) for pair in phase.contacts)
 
 
 def _moved(pose: FloatArray, points: FloatArray) -> FloatArray:
     x, y, z = points.T
-    rows = [
-        (pose[3 * e] * x + pose[3 * e + 1] * y + pose[3 * e + 2] * z) + pose[9 + e]
-        for e in range(3)
-    ]
-    return np.column_stack(rows)
+    turned = [pose[e] * x + pose[e + 1] * y + pose[e + 2] * z for e in (0, 3, 6)]
+    return np.column_stack([row + shift for row, shift in zip(turned, pose[9:], strict=True)])

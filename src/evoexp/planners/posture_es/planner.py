@@ -1,20 +1,18 @@
 """Postures as individuals: an evolution strategy whose winner's ancestry is the path.
 
 Corsépius 2001. An individual is one posture. The search begins with the momentary posture alone;
-every cycle generates offspring by random steps within a local scope of the parents (Fig. 2), rates
-them in configuration and in work space at once, and selects the best as the next parents. When an
-individual meets the goal, the path is its line of ancestors, from the start on: no path is planned,
-and inverse kinematics is solved on the way. A task may have several phases; each is a search of its
-own that begins at the last posture of the phase before.
+every cycle generates offspring by random steps within a local scope of the parents (Fig. 2), and
+selects the best as the next parents. When an individual meets the goal, the path is its line of
+ancestors. A task may have several phases; each is a search of its own that begins at the last
+posture before.
 
 A population is an array (nq, individuals) [rad]. A solution is flat: the ancestry, postures × nq
 [rad], from the start to the best so far, through all phases.
 
 The best so far is the individual of the lowest cost in its phase; once individuals meet the goal,
-the cheapest of these, whose cost need not be the lowest. Costs of different phases cannot be
-compared: while a phase before the last is searched, the plan's cost is inf and the phase's own cost
-is the term `cost`. Individuals that collide or pass a hard limit are rated, but are never parents;
-means and deviations leave them out.
+the cheapest of these. Costs of different phases cannot be compared: while a phase before the last
+is searched, the plan's cost is inf. Individuals that collide or pass a hard limit are never
+parents; means and deviations leave them out.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,7 +28,7 @@ from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape, Listing, joint_names, of_limits, of_place
+from evoexp.planners.answers import CoverShape, Listing, in_shape, of_postures
 from evoexp.planners.arm_tasks import cover_shapes
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
@@ -136,13 +134,12 @@ class PostureEs(PlannerDefaults, Component):
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: straight in joint space, a posture per instant."""
-        return Motion(np.ascontiguousarray(self._postures(problem, solution)))
+        return Motion(self._postures(problem, solution))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of the last posture in its phase, and of the whole path.
 
-        `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not
-        reached.
+        `phase_1_end` and so on: postures, from 0, at which phases end; −1: not reached.
         """
         postures = self._postures(problem, solution)
         found, several = problem.spans(postures), len(problem.phases) > 1
@@ -156,12 +153,7 @@ class PostureEs(PlannerDefaults, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare the start with the task's, and all postures with the joint limits."""
-        postures = self._postures(problem, solution)
-        names = joint_names(len(problem.start))
-        return [
-            *of_place("the start", postures[0], problem.start, "rad"),
-            *of_limits(names, postures.T, problem.limits, "rad"),
-        ]
+        return of_postures(self._postures(problem, solution), problem.start, problem.limits)
 
     def listing(self, problem: Problem, solution: FloatArray) -> Listing:
         """Return a table with one row per posture: phase, terms, cost, step from the one before."""
@@ -198,10 +190,8 @@ class PostureEs(PlannerDefaults, Component):
         """Describe the collision model and list the body pairs that it skips."""
         objects = zip(problem.task.names, problem.task.objects, strict=True)
         hulls = [name for name, each in objects if each.shape == "hull"]
-        return (
-            *problem.bodies.notes(problem.task.length_unit, is_complete=True),
-            *hull_notes(hulls),
-        )
+        own = problem.bodies.notes(problem.task.length_unit, is_complete=True)
+        return *own, *hull_notes(hulls)
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the spheres or capsules around the robot's bodies."""
@@ -222,10 +212,7 @@ class PostureEs(PlannerDefaults, Component):
         return terms
 
     def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        num = len(problem.start)
-        if solution.ndim != 1 or len(solution) == 0 or len(solution) % num:
-            raise ValueError(f"a solution has a multiple of {num} values, was {solution.shape}")
-        return solution.reshape(-1, num)
+        return in_shape(solution, -1, len(problem.start))
 
 
 class _Paths:
@@ -286,6 +273,5 @@ def dense(postures: FloatArray) -> FloatArray:
     """Return configurations (nq, n) along the straight motion through postures (postures, nq)."""
     shares = np.arange(DENSE) / DENSE
     between = postures[:-1, None, :] + shares[:, None] * np.diff(postures, axis=0)[:, None, :]
-    return np.ascontiguousarray(
-        np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]]).T
-    )
+    every = np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]])
+    return np.ascontiguousarray(every.T)

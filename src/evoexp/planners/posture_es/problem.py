@@ -11,9 +11,17 @@ from evoexp.collision.covers.body_covers import Cover, inner_balls
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, UPRIGHT, PostureCost
+from evoexp.objectives.posture_cost import (
+    ANGLE,
+    AXIAL,
+    COLLISION,
+    HEADING,
+    TERMS,
+    UPRIGHT,
+    PostureCost,
+)
 from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
-from evoexp.planners.posture_es.phases import Problem
+from evoexp.planners.posture_es.phases import Judged, Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import local_pose
@@ -30,6 +38,12 @@ from evoexp.scenarios.posture_task import (
 )
 
 
+def _demand(holds: bool, field: str, must: str, was: object) -> None:
+    """Refuse a setting of which something does not hold."""
+    if not holds:
+        raise SettingError(field, must, was)
+
+
 def prepare(
     robot: Robot,
     scenario: PostureTask | MoveitTask,
@@ -37,32 +51,22 @@ def prepare(
     objective: PostureCost,
     collision: CollisionModel,
 ) -> Problem:
-    """Return the problem of a task.
-
-    Raises:
-        SettingError: If a joint has no limits, the start or the scope does not fit the robot, the
-            start collides, a goal is out of reach, a contact names nothing, or a goal and the terms
-            that rate it contradict each other.
-    """
+    """Return the problem of a task; a SettingError names what contradicts robot, goals or terms."""
     assembly = _built(robot)
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
-    if assembly.num_arms != 1:
-        raise SettingError("robot", "one arm", f"{assembly.num_arms} arms")
+    _demand(assembly.num_arms == 1, "robot", "one arm", f"{assembly.num_arms} arms")
     task = posture_task(assembly, scenario)
     limits = _limits(assembly)
     start = _start(task, assembly, limits)
-    if len(scope) not in (1, len(start)):
-        must = f"one number, or one per joint ({len(start)})"
-        raise SettingError("planner.scope", must, list(scope))
+    must = f"one number, or one per joint ({len(start)})"
+    _demand(len(scope) in (1, len(start)), "planner.scope", must, list(scope))
     obstacles = obstacle_table(task.objects).without_ellipses()
     bodies = _bodies(robot, collision, assembly.disabled)
     tool = assembly.tools[0]
     for k, name in enumerate(task.names):
-        if name in bodies.names:
-            raise SettingError(
-                f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name
-            )
+        must = "a name that no body of the robot has"
+        _demand(name not in bodies.names, f"scenario.obstacles[{k}].name", must, name)
     problem = Problem(
         assembly,
         bodies,
@@ -80,15 +84,20 @@ def prepare(
         task.security_margin,
         {},
     )
-    _check_contacts(task, (*bodies.names, *task.all_names))
-    if task.check_reach:
-        _check_reach(problem, isinstance(scenario, MoveitTask))
-    stage = problem.begin(0, start, problem.first_situation)
-    problem = replace(problem, scene=problem.scene_of(stage))
+    names = *bodies.names, *task.all_names
+    for k, phase in enumerate(task.phases):
+        for c, pair in enumerate(phase.contacts):
+            for name in (name for name in pair if name not in names):
+                field = f"scenario.phases[{k}].contacts[{c}]"
+                must = f"names of bodies or obstacles ({', '.join(names)})"
+                raise SettingError(field, must, name, nearest(name, names))
     goal = None
     if isinstance(scenario, MoveitTask):
         goal = scenario.goal_configuration(assembly.joint_names)
-    return _fitted(problem, goal)
+    if task.check_reach:
+        _check_reach(problem, isinstance(scenario, MoveitTask))
+    stage = problem.begin(0, start, problem.first_situation)
+    return _fitted(replace(problem, scene=problem.scene_of(stage)), goal)
 
 
 def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
@@ -96,7 +105,7 @@ def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
 
     Where the bodies do not touch there; refuse a start that is infeasible all the same.
     """
-    if goal is None and _is_feasible(problem):
+    if goal is None and _judged_start(problem).feasible[0]:
         return problem
     ends = [problem.start] if goal is None else [problem.start, goal]
     free = [q for q in ends if _distances(problem, q).min(initial=np.inf) > 0.0]
@@ -104,14 +113,22 @@ def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
         table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
         bodies = problem.bodies.fitted(table, ignored, np.column_stack(free))
         problem = replace(problem, bodies=bodies, memory={})
-    if not _is_feasible(problem):
-        raise _infeasible(problem, problem.start)
+    judged = _judged_start(problem)
+    if not judged.feasible[0]:
+        must = "within the hard limits of upright and keep_parallel"
+        if judged.rows[COLLISION, 0] != 0.0:
+            distances, scene = _distances(problem, problem.start), problem.scene
+            assert scene is not None
+            one, two = scene.pair_names(int(np.argmin(distances)))
+            depth = f"{max(-float(distances.min()), 0.0):.3g} {problem.task.length_unit}"
+            must = f"free of collision ({one} and {two} overlap by {depth})"
+        raise SettingError("scenario.q_start", must, list(problem.task.q_start))
     return problem
 
 
-def _is_feasible(problem: Problem) -> bool:
+def _judged_start(problem: Problem) -> Judged:
     stage = problem.begin(0, problem.start, problem.first_situation)
-    return bool(stage.judge(problem.start[:, None]).feasible[0])
+    return stage.judge(problem.start[:, None])
 
 
 def _distances(problem: Problem, q: FloatArray) -> FloatArray:
@@ -141,46 +158,35 @@ def _limits(assembly: Assembly) -> FloatArray:
     limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
     for joint in range(1, model.njoints):
         low, high = limits[model.idx_qs[joint]]
-        if not (abs(low) < 1e6 and abs(high) < 1e6 and low < high):
-            raise SettingError(
-                "robot.joint_limits",
-                "given for every joint: postures are drawn between them, and margins rated",
-                f"none for joint '{model.names[joint]}'",
-            )
+        must = "given for every joint: postures are drawn between them, and margins rated"
+        is_given = abs(low) < 1e6 and abs(high) < 1e6 and low < high
+        _demand(is_given, "robot.joint_limits", must, f"none for joint '{model.names[joint]}'")
     return limits
 
 
 def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatArray:
-    if len(task.q_start) != assembly.model.nq:
-        raise SettingError(
-            "scenario.q_start", f"one value per joint ({assembly.model.nq})", len(task.q_start)
-        )
+    nq = assembly.model.nq
+    must = f"one value per joint ({nq})"
+    _demand(len(task.q_start) == nq, "scenario.q_start", must, len(task.q_start))
     # model units per unit of the scenario: degrees, lengths of sliding joints
-    units = np.full(assembly.model.nq, DEGREE)
-    units[assembly.table.slides] = 1.0
+    units = np.where(assembly.table.slides, 1.0, DEGREE)
     start = np.array(task.q_start) * units
     for k, (value, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
-        if not least <= value <= greatest:
-            raise SettingError(
-                f"scenario.q_start[{k}]",
-                f"within the joint's limits, {least / units[k]:g} to {greatest / units[k]:g}",
-                task.q_start[k],
-            )
+        must = f"within the joint's limits, {least / units[k]:g} to {greatest / units[k]:g}"
+        fits = bool(least <= value <= greatest)
+        _demand(fits, f"scenario.q_start[{k}]", must, task.q_start[k])
     return start
 
 
 def _weights(task: PostureTask, objective: PostureCost, obstacles: ObstacleTable) -> FloatArray:
     """Return the weights of every phase, (phases, terms)."""
     rows = []
+    on_the_way = {"goal_distance", "limit_margin", "collision"}
+    of_subgoal = tuple(name for name in objective.chosen if name in on_the_way)
     for k, phase in enumerate(task.all_phases):
         subgoal = k < len(task.subgoals)
         field = f"scenario.phases[{k - len(task.subgoals)}].terms"
-        on_the_way = tuple(
-            name
-            for name in objective.chosen
-            if name in ("goal_distance", "limit_margin", "collision")
-        )
-        weights = objective.weights(on_the_way if subgoal else phase.terms, field)
+        weights = objective.weights(of_subgoal if subgoal else phase.terms, field)
         if not subgoal:
             _check_terms(phase, weights, task, obstacles, field)
         rows.append(weights)
@@ -191,73 +197,40 @@ def _check_terms(
     phase: Phase, weights: FloatArray, task: PostureTask, obstacles: ObstacleTable, field: str
 ) -> None:
     """Refuse terms without a meaning for the goal of a phase, or that contradict it."""
-    goal, where = phase.goal, field.removesuffix("terms") + "goal"
-    if weights[0] == 0.0:
-        raise SettingError(
-            field, "terms with goal_distance: every goal is a place", list(phase.terms)
-        )
-    if weights[ANGLE] > 0.0 and not isinstance(goal, PoseGoal | ShiftGoal):
-        raise SettingError(
-            where,
-            f"a pose, since goal_angle rates its orientation (or {field} without it)",
-            goal.kind,
-        )
-    if isinstance(goal, PoseGoal) and weights[ANGLE] == 0.0:
-        raise SettingError(where, "a point, since no goal_angle rates its orientation", "pose")
-    if phase.upright_tolerance is not None and weights[UPRIGHT] == 0.0:
-        raise SettingError(
-            field.removesuffix("terms") + "upright_tolerance",
-            "left out in a phase whose terms do not count upright",
-            phase.upright_tolerance,
-        )
+    goal, where, counts = phase.goal, field.removesuffix("terms") + "goal", weights > 0.0
+    must = "terms with goal_distance: every goal is a place"
+    _demand(counts[0], field, must, list(phase.terms))
+    must = f"a pose, since goal_angle rates its orientation (or {field} without it)"
+    _demand(not counts[ANGLE] or isinstance(goal, PoseGoal | ShiftGoal), where, must, goal.kind)
+    must = "a point, since no goal_angle rates its orientation"
+    _demand(counts[ANGLE] or not isinstance(goal, PoseGoal), where, must, "pose")
+    tilt, must = phase.upright_tolerance, "left out in a phase whose terms do not count upright"
+    tilt_field = field.removesuffix("terms") + "upright_tolerance"
+    _demand(tilt is None or counts[UPRIGHT], tilt_field, must, tilt)
     for term in (AXIAL, HEADING):
-        if weights[term] > 0.0 and not isinstance(goal, SurfaceGoal):
-            raise SettingError(
-                where,
-                f"the surface of an object, since {TERMS[term]} rates the way to it (or {field} "
-                "without it)",
-                goal.kind,
-            )
+        must = f"the surface of an object, since {TERMS[term]} rates the way to it "
+        must += f"(or {field} without it)"
+        _demand(not counts[term] or isinstance(goal, SurfaceGoal), where, must, goal.kind)
     if isinstance(goal, SurfaceGoal):
         kind = obstacles.kind[task.names.index(goal.object)]
-        shape = task.objects[task.names.index(goal.object)].shape
-        if shape in ("half_space", "hull"):
-            must = "a sphere, box, capsule or cylinder"
-            raise SettingError(f"{where}.object", must, shape)
-        if weights[AXIAL] > 0.0 and kind not in (CYLINDER, CAPSULE):
-            raise SettingError(
-                f"{where}.object",
-                "a cylinder or capsule, since axial_approach rates its axis",
-                shape,
-            )
+        shape, of = task.objects[task.names.index(goal.object)].shape, f"{where}.object"
+        has_surface = shape not in ("half_space", "hull")
+        _demand(has_surface, of, "a sphere, box, capsule or cylinder", shape)
+        must = "a cylinder or capsule, since axial_approach rates its axis"
+        _demand(not counts[AXIAL] or kind in (CYLINDER, CAPSULE), of, must, shape)
 
 
 def _covers(
     task: PostureTask, obstacles: ObstacleTable, collision: CollisionModel
 ) -> dict[int, tuple[Cover, Cover]]:
     """Return covers of the objects that are grasped, and shapes inside, in their own frames."""
-    taken = {task.names.index(phase.object) for phase in task.phases if phase.then == "attach"}
-    shapes = obstacle_shapes(obstacles)
-    found = {}
-    for k in taken:
+    shapes, found = obstacle_shapes(obstacles), {}
+    for k in {task.names.index(phase.object) for phase in task.phases if phase.then == "attach"}:
         item = pin.GeometryObject(task.names[k], 0, 0, pin.SE3.Identity(), shapes[k][0])
         inner = inner_balls(item, task.allowed_penetration or 0.0)
         assert inner is not None  # the task lets nothing else be grasped
         found[k] = collision.cover(item), inner
     return found
-
-
-def _check_contacts(task: PostureTask, names: tuple[str, ...]) -> None:
-    for k, phase in enumerate(task.phases):
-        for c, pair in enumerate(phase.contacts):
-            for name in pair:
-                if name not in names:
-                    raise SettingError(
-                        f"scenario.phases[{k}].contacts[{c}]",
-                        f"names of bodies or obstacles ({', '.join(names)})",
-                        name,
-                        nearest(name, names),
-                    )
 
 
 def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
@@ -267,22 +240,19 @@ def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
     """
     table, tool = assembly.table, assembly.tools[0]
     joint, far = tool.joint - 1, float(np.sqrt(np.sum(tool.position * tool.position)))
+    # the greatest slide of each joint; 0 if it turns
+    multiplier, offset = table.rule.T
+    slides = np.abs(multiplier) * np.abs(limits).max(axis=1)[table.index_q] + np.abs(offset)
+    slides = np.where(table.prismatic, slides, 0.0)
     while table.parent[joint] >= 0:
         before = int(table.parent[joint])
-        (x, y, z), slide = table.translation[joint], _stroke(assembly, limits, joint)
+        x, y, z = table.translation[joint]
         if table.parent[before] < 0 and not table.prismatic[before] and x == 0.0 and y == 0.0:
-            return table.translation[before] + z * table.rotation[before][[2, 5, 8]], far + slide
-        far += float(np.sqrt(x * x + y * y + z * z)) + slide
+            axis = table.rotation[before][[2, 5, 8]]
+            return table.translation[before] + z * axis, far + float(slides[joint])
+        far += float(np.sqrt(x * x + y * y + z * z)) + float(slides[joint])
         joint = before
-    return table.translation[joint], far + _stroke(assembly, limits, joint)
-
-
-def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
-    """Return the greatest slide of a joint of the table; 0 if it turns."""
-    table = assembly.table
-    multiplier, offset = table.rule[joint]
-    stroke = abs(multiplier) * float(np.abs(limits[table.index_q[joint]]).max()) + abs(offset)
-    return float(stroke) if table.prismatic[joint] else 0.0
+    return table.translation[joint], far + float(slides[joint])
 
 
 def _check_reach(problem: Problem, is_moveits: bool) -> None:
@@ -311,19 +281,3 @@ def _check_reach(problem: Problem, is_moveits: bool) -> None:
                 must = f"{must} (check_reach=false searches it anyway)"
                 raise SettingError(field, must, f"{away:.4g} away")
         held = {"attach": True, "detach": False}.get(phase.then, held)
-
-
-def _infeasible(problem: Problem, start: FloatArray) -> SettingError:
-    """Return the reason for which a start is refused."""
-    scene, given = problem.scene, list(problem.task.q_start)
-    assert scene is not None
-    distances = _distances(problem, start)
-    stage = problem.begin(0, start, problem.first_situation)
-    if stage.judge(start[:, None]).rows[TERMS.index("collision"), 0] == 0.0:
-        return SettingError(
-            "scenario.q_start", "within the hard limits of upright and keep_parallel", given
-        )
-    one, two = scene.pair_names(int(np.argmin(distances)))
-    depth = f"{max(-float(distances.min()), 0.0):.3g} {problem.task.length_unit}"
-    must = f"free of collision ({one} and {two} overlap by {depth})"
-    return SettingError("scenario.q_start", must, given)

@@ -4,7 +4,6 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import model_validator
 
-from evoexp.errors import SettingError
 from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
 
 
@@ -33,24 +32,12 @@ class StrategySettings(Component):
 
     @model_validator(mode="after")
     def _parents_fit(self) -> Self:
-        if (
-            self.selection == "comma"
-            and self.num_parents > self.num_offspring + self.num_immigrants
-        ):
-            raise SettingError(
-                "num_parents",
-                f"at most num_offspring ({self.num_offspring}) with comma selection",
-                self.num_parents,
-            )
+        fits = self.num_parents <= self.num_offspring + self.num_immigrants
+        must = f"at most num_offspring ({self.num_offspring}) with comma selection"
+        self.demand("num_parents", fits or self.selection == "plus", must)
         return self
 
     @property
     def population_size(self) -> int:
         """Individuals judged before the first cycle: the start."""
         return 1
-
-    @property
-    def num_evaluations(self) -> int:
-        """Evaluations of a run that uses all cycles."""
-        cycles = max(self.num_generations - 1, 0) * (self.num_offspring + self.num_immigrants)
-        return 1 + cycles + min(self.num_generations, 1) * (self.initial_size + self.num_immigrants)

@@ -9,20 +9,35 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.ellipse_kernels import PathChecks, prepare_checks
+from evoexp.collision.planar.ellipse_kernels import (
+    Ellipses,
+    PathChecks,
+    TestedPath,
+    check_paths,
+    prepare_checks,
+)
 from evoexp.evolution.bit_coding import decode_bits
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.planners.redundant_ga.sub_path_costs import (
-    RESULTS,
-    Judging,
-    drop_collisions,
-    list_inside,
-    measure,
-)
+from evoexp.numeric.vectors import LANES
+from evoexp.objectives.reaching import measure_reach
 from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.planar_ends import PlanarArm
+
+RESULTS = 3  # last rows of a table of individuals: cost, position error, joint displacement
+
+
+class Judging(NamedTuple):
+    """The collision model and the objective of a sub-path."""
+
+    arm: PlanarArm  # the arm
+    ellipses: Ellipses  # the ellipses
+    path: TestedPath  # the positions that are tested
+    target: FloatArray  # (2,) desired place of the tip [length unit]
+    box: FloatArray  # (4,) least and greatest x, least and greatest y of the tip [length unit]
+    weights: tuple[float, float]  # w1, w2 of Eq. 4.
 
 
 class SubPath(NamedTuple):
@@ -58,11 +73,7 @@ def evolve(
     tables: FloatArray,
     summaries: FloatArray,  # (places, 4) see `summarise_costs`
 ) -> int:
-    """Compute the generations behind one up to another, or up to the first that is good enough.
-
-    Returns:
-        The last generation that was computed.
-    """
+    """Compute generations up to another, or the first that is good enough; return the last one."""
     uniforms, normals, rules, sub_path = borrowed((uniforms, normals, rules, sub_path))
     tables, summaries = borrowed((tables, summaries))
     num_genes, parents, size = sub_path.num_genes, sub_path.parents, len(sub_path.hit)
@@ -103,10 +114,7 @@ def begin(
 def draw(
     uniforms: FloatArray, count: int, sub_path: SubPath, table: FloatArray, checks: PathChecks
 ) -> None:
-    """Write and judge `count` individuals, uniform within the limits or bit by bit.
-
-    By numbers (genes · count,) in [0, 1).
-    """
+    """Write and judge individuals, uniform in the limits or bits, by (genes · count,) numbers."""
     num_genes, limits, lanes = sub_path.num_genes, sub_path.limits, sub_path.lanes
     for gene in range(num_genes):
         row, numbers = table[gene], uniforms[gene * count : (gene + 1) * count]
@@ -150,8 +158,7 @@ def succeed(
 ) -> None:
     """Judge the offspring in the population that follows another; put the elites behind them.
 
-    A child that ends outside the box, or is its own parent, is not tested for collisions. One with
-    all genes of a parent costs as much.
+    A child with all genes of a parent costs as much, and is not tested for collisions.
     """
     starts, judging, lanes = sub_path.starts, sub_path.judging, sub_path.lanes
     row, count, num_genes = len(population) - RESULTS, len(sub_path.parents), sub_path.num_genes
@@ -170,3 +177,59 @@ def succeed(
         num_open += gene < num_genes
     drop_collisions(starts, angles, lanes, num_open, judging, following, sub_path.hit, checks)
     copy_members(population, sub_path.elites, following, count)
+
+
+@kernel
+def measure(
+    starts: FloatArray, angles: FloatArray, count: int, judging: Judging, table: FloatArray
+) -> None:
+    """Write Eq. 4 without collisions, and its parts, for the first `count` individuals."""
+    row, lanes = len(table) - RESULTS, np.arange(count + LANES)
+    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
+    results = table[row], table[row + 1], table[row + 2]
+    measure_reach(starts, angles, lanes, count, arm, target, box, weights, *results)
+
+
+@kernel
+def list_inside(table: FloatArray, count: int, lanes: IntArray) -> int:
+    """List the individuals of finite cost in `lanes`; return how many there are."""
+    cost, inside = table[len(table) - RESULTS], 0
+    for k in range(count):
+        lanes[inside] = k
+        inside += cost[k] < np.inf
+    return inside
+
+
+@kernel
+def drop_collisions(
+    starts: FloatArray,
+    angles: FloatArray,
+    lanes: IntArray,
+    count: int,
+    judging: Judging,
+    table: FloatArray,
+    hit: BoolArray,
+    checks: PathChecks,
+) -> None:
+    """Write inf as the cost of those among `lanes` that collide on their way."""
+    cost = table[len(table) - RESULTS]
+    arm, ellipses, path = judging.arm, judging.ellipses, judging.path
+    check_paths(starts, angles, lanes, count, arm, ellipses, path, hit, checks)
+    for k in range(count):
+        individual = lanes[k]
+        cost[individual] = np.inf if hit[individual] else cost[individual]
+
+
+@kernel
+def judge_paths(starts: FloatArray, ends: FloatArray, judging: Judging) -> FloatArray:
+    """Return Eq. 4 and its parts, (3, individuals), of sub-paths by both ends (joints, …).
+
+    An individual whose tip ends outside the box is not tested for collisions.
+    """
+    count = starts.shape[1]
+    results, lanes = np.empty((RESULTS, count)), np.empty(count + LANES, dtype=np.int64)
+    measure(starts, ends, count, judging, results)
+    left, hit = list_inside(results, count, lanes), np.zeros(count, dtype=np.bool_)
+    checks = prepare_checks(len(starts), count)
+    drop_collisions(starts, ends, lanes, left, judging, results, hit, checks)
+    return results

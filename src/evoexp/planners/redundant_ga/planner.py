@@ -8,11 +8,8 @@ until both are successful, up to `num_attempts` times.
 A population is an array (joints, individuals) [rad] of end postures of one sub-path, or (joints ×
 bits, individuals). A solution is flat: three postures (start, A, B) × joints [rad].
 
-The best so far is a whole plan. Only the second search has plans; a plan costs its objective of SP2
-(Eq. 4), and the plan of the lowest cost over all generations and attempts is the best so far. Until
-there is a plan of finite cost, the best posture A of any attempt so far takes its place, as a plan
-that stays there, at the cost inf. The individuals of SP1 cost their objective of SP1; the best plan
-in a generation of SP1 costs inf.
+The best so far is a whole plan, which costs its objective of SP2 (Eq. 4). Until there is a plan of
+finite cost, the best posture A so far takes its place, as a plan that stays there, at the cost inf.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,13 +21,13 @@ from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import joint_names, of_limits, of_place
+from evoexp.planners.answers import in_shape, of_postures
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
+from evoexp.planners.redundant_ga.kernels import Judging, judge_paths
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.planners.redundant_ga.sub_path import TERMS, Search
-from evoexp.planners.redundant_ga.sub_path_costs import Judging, judge_paths
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
@@ -40,11 +37,7 @@ CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellip
 
 
 class RedundantGa(PlannerDefaults, Component):
-    """The algorithm of Lavoie & Boudreau, sections 3 to 5.
-
-    Random search takes the generations and evaluations of one search, those of `ga`; sequential
-    search goes through the same attempts and searches as the algorithm.
-    """
+    """The algorithm of Lavoie & Boudreau, sections 3 to 5."""
 
     component: ClassVar[str] = "redundant_ga"
     goal_is_region: ClassVar[bool] = True
@@ -75,10 +68,7 @@ class RedundantGa(PlannerDefaults, Component):
     def search_in_turn(
         self, problem: Problem, rng: np.random.Generator, kind: type[Search]
     ) -> Iterator[Block]:
-        """Yield the generations of SP1 and SP2 in turn, until both are successful.
-
-        By a kind of search: the genetic algorithm, or a control in its place.
-        """
+        """Yield the generations of SP1 and SP2 in turn, until both are successful."""
         search = kind(self, problem, rng)
         for _ in range(self.num_attempts):
             via = yield from search.sub_path(problem.start)
@@ -99,10 +89,7 @@ class RedundantGa(PlannerDefaults, Component):
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures A and B, uniform within the joint limits, (2, joints, count)."""
         low, high = problem.joint_limits.T
-        postures = rng.random((2, len(low), count))
-        postures *= (high - low)[:, None]
-        postures += low[:, None]
-        return postures
+        return np.asarray(low[:, None] + (high - low)[:, None] * rng.random((2, len(low), count)))
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge pairs of postures A and B (2, joints, individuals): what random search draws.
@@ -112,13 +99,9 @@ class RedundantGa(PlannerDefaults, Component):
         """
         starts = np.repeat(problem.start[:, None], population.shape[2], axis=1)
         first, second = np.ascontiguousarray(population)
-        terms = np.concatenate(
-            [
-                judge_paths(starts, first, self.judging(problem, 0)),
-                judge_paths(first, second, self.judging(problem, 1)),
-            ]
-        )
-        named = dict(zip(TERMS, terms, strict=True))
+        via = judge_paths(starts, first, self.judging(problem, 0))
+        goal = judge_paths(first, second, self.judging(problem, 1))
+        named = dict(zip(TERMS, (*via, *goal), strict=True))
         cost = np.where(self.successful(0, named["of_sp1"]), named["of_sp2"], np.inf)
         if self.answers_are_proven:
             Proofs(self, problem).settle(cost, lambda k: self.solution(problem, population, k))
@@ -127,15 +110,8 @@ class RedundantGa(PlannerDefaults, Component):
 
     def judging(self, problem: Problem, path: int) -> Judging:
         """Return collision model and objective of a sub-path (0: SP1, 1: SP2)."""
-        collision = problem.collision
-        return Judging(
-            collision.arm,
-            collision.ellipses,
-            collision.path,
-            problem.targets[path],
-            problem.boxes[path],
-            self.objective.weights,
-        )
+        own, (target, box) = problem.collision, (problem.targets[path], problem.boxes[path])
+        return Judging(own.arm, own.ellipses, own.path, target, box, self.objective.weights)
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return a pair of postures A and B as a flat solution."""
@@ -143,7 +119,7 @@ class RedundantGa(PlannerDefaults, Component):
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: start, A, B, straight in joint space, in equal times."""
-        return Motion(np.ascontiguousarray(self._postures(problem, solution)))
+        return Motion(self._postures(problem, solution))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of both sub-paths, and the first contact of each.
@@ -165,12 +141,7 @@ class RedundantGa(PlannerDefaults, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare the start with the task's, and all postures with the joint limits."""
-        postures = self._postures(problem, solution)
-        names = joint_names(len(problem.start))
-        return [
-            *of_place("the start", postures[0], problem.start, "rad"),
-            *of_limits(names, postures.T, problem.joint_limits, "rad"),
-        ]
+        return of_postures(self._postures(problem, solution), problem.start, problem.joint_limits)
 
     def judge_plan(self, problem: Problem, solution: FloatArray) -> FloatArray:
         """Return cost, position error and joint displacement of both sub-paths, (2, 3)."""
@@ -190,7 +161,4 @@ class RedundantGa(PlannerDefaults, Component):
         return ((len(problem.start),),) * 3
 
     def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        num = len(problem.start)
-        if solution.shape != (3 * num,):
-            raise ValueError(f"a solution has {3 * num} values, was {solution.shape}")
-        return solution.reshape(3, num)
+        return in_shape(solution, 3, len(problem.start))

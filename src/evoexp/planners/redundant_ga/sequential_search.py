@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import field_validator
 
 from evoexp.errors import SettingError
+from evoexp.planners.planner import WrappedPlanner
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.planners.redundant_ga.sub_path import DrawnSearch
-from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Block
 from evoexp.validation import Component
 
@@ -18,10 +18,8 @@ from evoexp.validation import Component
 class SequentialSearch(WrappedPlanner):
     """Searches SP1, then SP2, by uniform draws; everything but the operators is as in the planner.
 
-    Population size, number of generations, stopping costs and attempts are those of the planner.
-    Selection, crossover and mutation are left out: every generation is drawn anew, and the best
-    individual drawn so far ends the sub-path. What the planner does better is due to evolution.
-    (Random search draws both sub-paths at once and must succeed in both with one draw.)
+    Every generation is drawn anew, and the best individual drawn so far ends the sub-path. (Random
+    search draws both sub-paths at once and must succeed in both with one draw.)
     """
 
     component: ClassVar[str] = "sequential_search"

@@ -16,9 +16,8 @@ from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.kernels import SubPath
+from evoexp.planners.redundant_ga.kernels import RESULTS, SubPath
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
-from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
 from evoexp.records import Best, Block, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -176,8 +175,7 @@ class Search(GeneticSearch):
 class DrawnSearch(Search):
     """The same search without evolution: every generation is drawn as the initial population is.
 
-    A generation draws as many individuals as the genetic algorithm breeds, and costs as many
-    evaluations. The best end is that of all draws.
+    A generation draws as many individuals as would be bred; the best end is that of all draws.
     """
 
     evolving = False

@@ -36,13 +36,7 @@ class Trees(NamedTuple):
 
 @kernel
 def nearest_node(nodes: FloatArray, count: int, q: FloatArray) -> int:
-    """Return the node that is nearest to q, the first among equals.
-
-    Args:
-        nodes: (nq, room) [deg], contiguous; nodes are columns.
-        count: Number of nodes, at least 1.
-        q: (nq,) [deg].
-    """
+    """Return the node (a column of nodes (nq, room)) nearest to q, the first among equals."""
     best, least = 0, np.inf
     squares = np.empty(NODES)
     for first in range(0, count, NODES):
@@ -114,8 +108,7 @@ def edge_is_free(
 ) -> tuple[bool, int]:
     """Return whether an edge is free where it is tested, and how many configurations were asked.
 
-    They are asked for eight at a time, up to the first contact; the second end is the first, and
-    the first end known to be free. `num_free` and `tables` are those of a `FreeTest`.
+    They are asked for eight at a time, up to the first contact; its first end is known to be free.
     """
     q = DEGREE * tested_configurations(one, two, resolution)
     free = num_free(tables, q)
@@ -135,9 +128,8 @@ def _extended(
 ) -> tuple[Trees, int, int, int]:
     """EXTEND (Fig. 2) from a given node.
 
-    Returns:
-        The trees; the node that is new or, where none is, the given one; `TRAPPED`, `ADVANCED` or
-        `REACHED`; configurations asked for.
+    Returns the trees, the node that is new (else the given one), the outcome, configurations asked
+    for.
     """
     q = trees.nodes[tree, :, near].copy()
     new = step_toward(q, target, step)
@@ -170,16 +162,9 @@ def grow(
 ) -> tuple[Trees, int, int, int]:
     """Let one tree step toward a configuration, and the other connect to its end (Fig. 5).
 
-    Where a tree has no room left, the result has arrays of twice the size.
-
-    Args:
-        tree: The one that steps, 0 or 1.
-        target: (nq,) q_rand [deg].
-        step: The paper's ε [deg].
-
-    Returns:
-        The trees; where they met, the node of the tree that stepped and that of the other one, the
-        same configuration, else −1 for the latter; configurations asked for.
+    Returns the trees, in arrays of twice the size where one had no room left; where they met, the
+    node of the tree that stepped and that of the other one, the same configuration, else −1 for the
+    latter; and how many configurations were asked for.
     """
     near = nearest_node(trees.nodes[tree], trees.counts[tree], target)
     trees, end, outcome, asked = _extended(
@@ -214,12 +199,6 @@ def place_on_path(
 
     What is left of a segment on either side of it is tested at those of the segment's own
     configurations that lie there, since both parts are divided as densely as the whole.
-
-    Args:
-        path: (nodes, nq), two nodes at least.
-        lengths: (nodes,) of `lengths_along`.
-        at: Length from the start.
-        resolution: Greatest distance of tested neighbours [deg].
     """
     k = 0
     while k < len(path) - 2 and lengths[k + 1] <= at:
@@ -239,17 +218,11 @@ def place_on_path(
 def shortcuts(
     num_free: Any, tables: Any, path: FloatArray, ends: FloatArray, resolution: float
 ) -> tuple[FloatArray, IntArray, FloatArray, int]:
-    """Try straight lines between places of a path, one after the other.
+    """Try straight lines between places of a path (nodes, nq), one after the other.
 
-    A line begins and ends at the tested configurations next to its places.
-
-    Args:
-        path: (nodes, nq) [deg].
-        ends: (lines, 2) the places, as shares of the length of the path in hand.
-
-    Returns:
-        All nodes of the shorter paths that were found, path by path; how many nodes each has; the
-        length after each line, (lines,); configurations asked for.
+    The places (lines, 2) are shares of its length; a line begins and ends at the tested
+    configurations next to them. Returns all nodes of the shorter paths, path by path; how many
+    nodes each has; the length after each line, (lines,); configurations asked for.
     """
     most = len(path) + 2 * len(ends)  # nodes: a line adds two
     found, count, asked = np.empty((most * len(ends), path.shape[1])), 0, 0

@@ -6,25 +6,17 @@ are uniform within the joints' limits. A solution is flat: node by node, joint b
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
-from evoexp.planners.arm_tasks import (
-    UNLIMITED,
-    ArmProblem,
-    ArmTask,
-    arm_problem,
-    cover_notes,
-    cover_shapes,
-)
-from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
+from evoexp.planners.answers import in_shape
+from evoexp.planners.arm_tasks import UNLIMITED, ArmDefaults, ArmProblem, ArmTask, arm_problem
+from evoexp.planners.planner import JudgementArrays, Keeper, PlannerDefaults
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import distance, lengths_along
 from evoexp.planners.sampling_based.settings import EdgeSettings, TreeGrowth
@@ -52,7 +44,7 @@ class TreePaths(PlannerDefaults):
 
     def motion(self, problem: Any, solution: FloatArray) -> Motion | None:
         """Return the joint-space motion: straight, nodes in equal times; None without a path."""
-        path = self._path(problem, solution)
+        path = self.path(problem, solution)
         return Motion(np.ascontiguousarray(self.unit * path)) if len(path) > 1 else None
 
     def cost_of_terms(self, terms: Mapping[str, float]) -> float:
@@ -63,8 +55,13 @@ class TreePaths(PlannerDefaults):
         """Return the documented shape of a solution: any number of nodes × nq."""
         return ..., (len(problem.start),)
 
-    def batches(self, search: "IteratedSearch", rng: np.random.Generator) -> Iterator[Block]:
-        """Yield a record per batch of iterations, until the search comes to its end."""
+    def batches(self, search: Any, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield a record per batch of iterations, until a search comes to its end.
+
+        It has `edges`, `best_cost` [deg], `stop_reason` (empty while it goes on), `population`
+        (shown by a record), `candidate()`, and `iterate(rng, most)`: it goes on by some iterations
+        and returns the length in hand after each [deg]; none if all was done before.
+        """
         keeper = Keeper()
         for index in range(self.num_generations + 1):
             costs, asked = np.empty(0), search.edges.queries
@@ -90,15 +87,12 @@ class TreePaths(PlannerDefaults):
             if search.stop_reason:
                 return
 
-    def _path(self, problem: Any, solution: FloatArray) -> FloatArray:
+    def path(self, problem: Any, solution: FloatArray) -> FloatArray:
         """Return a flat solution as a path (nodes, nq)."""
-        nq = len(problem.start)
-        if solution.ndim != 1 or len(solution) == 0 or len(solution) % nq:
-            raise ValueError(f"a solution has a multiple of {nq} values, was {solution.shape}")
-        return np.ascontiguousarray(solution.reshape(-1, nq))
+        return in_shape(solution, -1, len(problem.start))
 
 
-class NodePaths(TreePaths, EdgeSettings):
+class NodePaths(TreePaths, ArmDefaults, EdgeSettings):
     """The usual answers of a planner of paths in degrees, to be inherited before `Component`."""
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
@@ -132,10 +126,7 @@ class NodePaths(TreePaths, EdgeSettings):
         return EdgeTest(problem.collision, self.resolution, proofs)
 
     def cost(self, problem: ArmProblem, population: FloatArray) -> JudgementArrays:
-        """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides.
-
-        And, if so asked, where a path is not proven.
-        """
+        """Judge paths (nq, nodes, individuals): length, inf in collision or if not proven."""
         edges = self.edge_test(problem)
         judged = judge_paths(edges, population.transpose(2, 1, 0))
         feasible, segments = judged.feasible, np.full(len(judged.cost), population.shape[1] - 1)
@@ -145,28 +136,13 @@ class NodePaths(TreePaths, EdgeSettings):
         terms = {"length_deg": length, "segments": segments, **judged.terms}
         return judged._replace(cost=cost, terms=terms)
 
-    def parts(self, problem: ArmProblem, motion: Motion) -> tuple[Part, ...]:
-        """Return the whole motion; arms and obstacles have margins of their own."""
-        return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
-
     def evaluate(self, problem: ArmProblem, solution: FloatArray) -> dict[str, float]:
         """Return length, segments and contacts of a path; its length beside the straight line's."""
-        path = self._path(problem, solution)
+        path = self.path(problem, solution)
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         straight = distance(problem.start, problem.goal)
         ratio = {"length_ratio": terms["length_deg"] / straight} if straight > 0.0 else {}
         return terms | ratio
-
-    def departures(self, problem: ArmProblem, solution: FloatArray) -> list[str]:
-        """Compare start and goal of every arm with the task's, and angles with their limits."""
-        path, found = self._path(problem, solution), []
-        if len(path) == 1:
-            found.append("there is no path, one configuration only")
-        for arm, (a, b) in enumerate(problem.arm_slices):
-            for end, row, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
-                name = f"the {end} of arm {arm + 1}"
-                found += of_place(name, path[row, a:b], wanted[a:b], "deg")
-        return found + of_limits(joint_names(path.shape[1]), path.T, problem.limits, "deg")
 
     def notes(self, problem: ArmProblem) -> list[str]:
         """Describe how densely edges are tested, the ranges of free joints, and the covers."""
@@ -177,11 +153,7 @@ class NodePaths(TreePaths, EdgeSettings):
             lines.append(
                 f"{joints} no limits: drawn up to {self.free_turn:g} deg beyond start and goal"
             )
-        return lines + cover_notes(problem.collision, problem.scene, problem.length_unit)
-
-    def covers(self, problem: ArmProblem) -> tuple[CoverShape, ...]:
-        """Return the circles, spheres and capsules that edges are tested with."""
-        return cover_shapes(problem.collision)
+        return lines + super().notes(problem)
 
     def _free_joints(self, problem: ArmProblem) -> tuple[np.ndarray, np.ndarray]:
         """Return which joints have no lower and which have no upper limit, each (nq,)."""
@@ -210,33 +182,6 @@ class InIterations(TreePaths):
         """Return the iterations of a generation, at most; a run may end within one."""
         size = self.ga.iterations_per_generation
         return max(0, min(size, self.most_iterations - index * size))
-
-
-class IteratedSearch(Protocol):
-    """The state of a run that goes on iteration by iteration."""
-
-    edges: EdgeTest  # tests edges and counts
-
-    @property
-    def best_cost(self) -> float:
-        """Length of the shortest path so far [deg], inf without one."""
-
-    @property
-    def stop_reason(self) -> str:
-        """Why the run ends now; empty while it goes on."""
-
-    @property
-    def population(self) -> FloatArray:
-        """(nodes, nq) what a record shows."""
-
-    def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
-        """Go on by some iterations, one at least and `most` at most.
-
-        Returns the length in hand after each [deg]; none if all was done before.
-        """
-
-    def candidate(self) -> Candidate:
-        """Return the shortest path as it is recorded."""
 
 
 def judge_paths(edges: EdgeTest, paths: FloatArray) -> JudgementArrays:

@@ -1,12 +1,10 @@
 """Planners of the Open Motion Planning Library (Sucan et al. 2012), on the same edges.
 
-OMPL asks whether configurations and straight edges are free; both are tested by the planner's
-collision model, as densely as RRT-Connect's here, and counted. All numbers are drawn by OMPL, from
-a seed of the replicate; its code makes the last bits those of an environment.
-
-A generation is a chunk of a search that goes on: its cost and its population are the path in hand.
-A planner that ends with its first path (RRTConnect) is done then, and the path is made shorter by
-random shortcuts (Geraerts & Overmars 2007).
+OMPL asks whether configurations and straight edges are free; both are tested as densely as those of
+RRT-Connect, and counted. All numbers are drawn by OMPL, from a seed of the replicate. A generation
+is a chunk of a search that goes on: its cost and its population are the path in hand. A planner
+that ends with its first path (RRTConnect) is done then, and the path is made shorter by random
+shortcuts.
 """
 
 import importlib.util
@@ -23,8 +21,7 @@ from evoexp.planners.planner import Candidate, Reproducibility
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
 from evoexp.planners.sampling_based.settings import OmplSettings
-from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import EdgeTest
+from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
@@ -51,9 +48,8 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
         from ompl import geometric  # of its Python packages some have more algorithms than others
 
         if not hasattr(geometric, self.algorithm):
-            must = (
-                f"another algorithm: the OMPL that is installed has no {self.algorithm} in Python"
-            )
+            must = "another algorithm: the OMPL that is installed has no "
+            must += f"{self.algorithm} in Python"
             raise SettingError("planner.algorithm", must, self.algorithm)
         for name in ("num_shortcuts", "num_smoothings"):
             if getattr(self, name) and self.algorithm not in DONE_WITH_A_PATH:
@@ -78,10 +74,10 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
 
 
 class _Search:
-    """A planner of OMPL at work on one problem, then shortcuts of its path; see `IteratedSearch`.
+    """A planner of OMPL on one problem, then shortcuts of its path; see `TreePaths.batches`.
 
-    An iteration is a chunk of the search; `population` is the path in hand, the start alone before
-    there is one.
+    An iteration is a chunk of the search; `population` is the path in hand, at first the start
+    alone.
     """
 
     def __init__(self, planner: OmplPlanner, problem: ArmProblem, seed: int) -> None:
@@ -179,11 +175,7 @@ class _Library:
         self._nq, self._start, self._goal = nq, problem.start, problem.goal
 
     def solve(self, most: int) -> FloatArray | None:
-        """Search until so many configurations were asked for.
-
-        Returns:
-            (nodes, nq) the best path so far [deg]; None: no path from start to goal yet.
-        """
+        """Search until so many were asked for; return the best path (nodes, nq) [deg], or None."""
         self._planner.solve(self._enough(most))
         if not self._problem.hasExactSolution():
             return None
@@ -206,11 +198,10 @@ class _Library:
 
 
 class _Roadmap(_Library):
-    """PRM*, whose roadmap grows without OMPL's second thread.
+    """PRM*, whose roadmap grows without OMPL's second thread, which waits for Python for ever.
 
-    `PRMstar.solve` looks for a path in a thread of its own, which waits for Python's lock for ever,
-    and would end the search at another moment each time. So that call only adds start and goal to
-    the roadmap, which then grows in this thread, and the shortest path over it is looked for here.
+    `PRMstar.solve` only adds start and goal; the roadmap then grows in this thread, and the
+    shortest path over it is looked for here.
     """
 
     def solve(self, most: int) -> FloatArray | None:

@@ -1,12 +1,9 @@
 """RRT-Connect: two trees that grow toward each other (Kuffner & LaValle 2000), then shortcuts.
 
-A baseline from outside the evolutionary planners: it is done with the first path that is free, and
-makes that one shorter by random shortcuts (Geraerts & Overmars 2007), as many as are asked for.
-The goal is never drawn on purpose.
-
-A generation is a batch of iterations: random configurations that the trees grow toward, then
-attempts to shorten the path. Its costs are the lengths of the path in hand after each iteration,
-inf before there is one; its population is all nodes of both trees.
+It is done with the first path that is free, and makes that one shorter by random shortcuts
+(Geraerts & Overmars 2007). The goal is never drawn on purpose. A generation is a batch of
+iterations; its costs are the lengths of the path in hand after each, inf before there is one; its
+population is all nodes of both trees.
 """
 
 from collections.abc import Iterator
@@ -19,8 +16,7 @@ from evoexp.planners.planner import Candidate
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import InIterations, NodePaths
 from evoexp.planners.sampling_based.settings import RrtSettings
-from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import TreePair
+from evoexp.planners.sampling_based.trees import ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.validation import Component
 
@@ -77,10 +73,7 @@ class _Search:
         return self.pair.nodes
 
     def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
-        """Grow the trees toward a random configuration, or try some shortcuts of the path.
-
-        Returns the length of the path in hand after each iteration [deg], inf without one.
-        """
+        """Grow the trees, or try some shortcuts; return the length after each [deg], or inf."""
         if self._is_done():
             self._keep_shortest()
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)

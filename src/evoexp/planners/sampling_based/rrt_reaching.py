@@ -1,14 +1,12 @@
 """RRT-Connect to places of a planar arm's tip: a posture is sought at each, then a path to it.
 
-A baseline beside the search of Lavoie & Boudreau 2001. For the via point and then for the goal
-point, postures whose tip is there are found from random ones by damped least squares; the nearest
-of the free ones is the goal of two trees, and the path between them is made shorter by shortcuts.
+For the via point and then for the goal point, postures whose tip is there are found from random
+ones by damped least squares; the nearest of the free ones is the goal of two trees.
 
 A solution is flat: posture by posture, joint by joint (postures × joints) [rad], the start
-included; the start alone: no path was found, and there is no motion. A generation is a batch of
-iterations: postures drawn, configurations that trees grow toward, shortcuts tried. Its costs are
-the lengths of the plans that its iterations complete, inf elsewhere; its population is the shortest
-plan so far.
+included; the start alone: there is no motion. A generation is a batch of iterations: its costs are
+the lengths of the plans that they complete, inf elsewhere; its population is the shortest plan so
+far.
 """
 
 from collections.abc import Generator, Iterator
@@ -18,7 +16,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.answers import joint_names, of_limits, of_place
+from evoexp.planners.answers import of_postures
 from evoexp.planners.planner import Candidate, JudgementArrays
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
@@ -30,8 +28,7 @@ from evoexp.planners.sampling_based.node_paths import (
     path_length,
 )
 from evoexp.planners.sampling_based.settings import ReachingSettings
-from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
+from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import bring_tip_to, tip
@@ -69,28 +66,21 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
         return (1 + self.num_restarts) * 2 * (2 * self.max_iterations + self.num_shortcuts) + 1
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
-        """Judge paths (joints, postures, individuals) [rad]: their length in degrees.
-
-        It is inf where a tested edge collides.
-        """
+        """Judge paths (joints, postures, individuals) [rad]: length [deg], inf in collision."""
         edges = EdgeTest(problem.collision, self.resolution)
         return judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return length and contacts of a path, and how near its postures come to both places."""
-        path = self._path(problem, solution)
+        path = self.path(problem, solution)
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         via, goal = self._errors(problem, path)
         return terms | {"via_error": via, "goal_error": goal}
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start, joint limits and the two places of the tip with the task's."""
-        path = self._path(problem, solution)
-        names, close = joint_names(len(problem.start)), CLOSE * problem.collision.arm.lengths.sum()
-        found = [
-            *of_place("the start", path[0], problem.start, "rad"),
-            *of_limits(names, path.T, problem.joint_limits, "rad"),
-        ]
+        path, close = self.path(problem, solution), CLOSE * problem.collision.arm.lengths.sum()
+        found = of_postures(path, problem.start, problem.joint_limits)
         for place, error in zip(PLACES, self._errors(problem, path), strict=True):
             if error > close:
                 found.append(f"the tip misses the {place} by {error:.3g}")
@@ -181,10 +171,7 @@ class _Search:
     def _posture(
         self, rng: np.random.Generator, begin: FloatArray, target: FloatArray
     ) -> Generator[float, None, FloatArray | None]:
-        """Search free postures whose tip is at a place; return the nearest to one (joints,) [deg].
-
-        None: too many draws led to none.
-        """
+        """Return the free posture nearest to one [deg] whose tip is at a place, or None."""
         problem, planner = self._problem, self._planner
         low, high = problem.joint_limits.T
         nearest, least, count = None, np.inf, 0

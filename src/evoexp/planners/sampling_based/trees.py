@@ -1,4 +1,8 @@
-"""Two trees that grow toward each other, and edges that are tested for contact."""
+"""Edges that are tested for contact, two trees that grow toward each other, and shorter paths.
+
+Shortcuts lead between random places (Geraerts & Overmars 2007, section 4). Corners are cut at a
+quarter of their segments (Chaikin 1974), which tends to a smooth curve.
+"""
 
 import itertools
 
@@ -12,18 +16,19 @@ from evoexp.planners.sampling_based.kernels import (
     Trees,
     edge_is_free,
     grow,
+    lengths_along,
+    shortcuts,
     tested_configurations,
 )
+from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.records import FloatArray
 
+CUT = 0.25  # [-] of a segment, from a corner to where it is cut
 ROOM = 256  # nodes that a tree has room for at first
 
 
 class EdgeTest:
-    """Tests straight edges, and counts the configurations that were asked for.
-
-    None behind the eight of an edge's first contact is.
-    """
+    """Tests straight edges, and counts the configurations asked for, up to the first contact."""
 
     def __init__(
         self,
@@ -50,10 +55,9 @@ class EdgeTest:
     def unproven(self, path: FloatArray) -> FloatArray | None:
         """Return a node (1, nq) or an edge (2, nq) of a path that is not proven; None if all are.
 
-        All are where no proof is asked for. A path (nodes, nq) [deg] is judged whole, but by pieces
-        behind one that was refuted: no piece is judged twice. Nodes come first: a contact that the
-        model does not see, as of bodies whose covers always touch, mostly lasts longer than an
-        edge, and a node costs a fraction of one.
+        A path (nodes, nq) [deg] is judged whole, but by pieces behind one that was refuted. Nodes
+        come first: a contact that the model does not see mostly lasts longer than an edge, and a
+        node costs less.
         """
         if self._proofs is None or (not self._is_doubtful and self._proofs.is_proven(path.ravel())):
             return None
@@ -97,13 +101,11 @@ class TreePair:
         return np.concatenate([nodes[:, :count].T for nodes, count in each])
 
     def iterate(self, target: FloatArray) -> FloatArray | None:
-        """Let one tree make a step toward a configuration, and the other connect to its end.
+        """Let one tree step toward q_rand (nq,) [deg], the other connect to its end; by turns.
 
-        The trees take turns in making the step (SWAP) toward q_rand (nq,) [deg].
-
-        Returns:
-            The path from start to goal (nodes, nq) if the trees have met and it is proven, where
-            that is asked for; None if not. The node or edge that is not is cut from its tree.
+        Returns the path from start to goal (nodes, nq) if the trees have met and it is proven,
+        where that is asked for; else None, and the node or edge that is not proven is cut from its
+        tree.
         """
         turn = self.num_iterations % 2
         self.num_iterations += 1
@@ -149,3 +151,70 @@ class TreePair:
         self._trees.counts[tree] = len(parents)
         self._trees.nodes[tree][:, : len(parents)] = nodes[:, stays]
         self._trees.parents[tree, : len(parents)] = parents
+
+
+class ShortenedPath:
+    """A path that becomes shorter, attempt by attempt; its `nodes` are never changed in place.
+
+    A shortcut begins and ends at configurations that were tested on the path: only the line between
+    them is new. Where edges are proven, too, paths are taken by the model first; `settle` judges
+    the last.
+    """
+
+    def __init__(self, nodes: FloatArray, edges: EdgeTest) -> None:
+        """Begin with a path (nodes, nq) that is free."""
+        self.nodes, self.lengths = nodes, lengths_along(nodes)
+        self._edges, self.num_attempts = edges, 0
+        self._before: list[FloatArray] = []  # the paths since the last one that was judged
+
+    @property
+    def length(self) -> float:
+        """Length of the path [deg]."""
+        return float(self.lengths[-1])
+
+    def settle(self) -> None:
+        """Go back to the last path that is proven, if the one in hand is not."""
+        while self._before and self._edges.unproven(self.nodes) is not None:
+            self.nodes = self._before.pop()
+        self._before, self.lengths = [], lengths_along(self.nodes)
+
+    def improve(self, settings: EdgeSettings, rng: np.random.Generator, most: int) -> FloatArray:
+        """Try some shortcuts, `most` at most, or cut the corners where all were tried.
+
+        Returns the length of the path after each attempt [deg].
+        """
+        left = settings.num_shortcuts - self.num_attempts
+        if left > 0:
+            return self.attempt(rng.random((min(left, most), 2)))
+        self.cut_corners()
+        return self.lengths[-1:]
+
+    def attempt(self, uniforms: FloatArray) -> FloatArray:
+        """Try lines between shares (attempts, 2) of the path; return its length after each."""
+        edges = self._edges
+        nodes, sizes, after, asked = shortcuts(*edges.test, self.nodes, uniforms, edges.resolution)
+        edges.queries += asked
+        for path in np.split(nodes, np.cumsum(sizes)[:-1]) if len(sizes) else []:
+            self._before.append(self.nodes)
+            self.nodes = path
+        self.lengths = lengths_along(self.nodes)
+        self.num_attempts += len(uniforms)
+        return after
+
+    def cut_corners(self) -> None:
+        """Cut every corner whose cut is free, if all that is left of the segments is free, too."""
+        self.num_attempts += 1
+        nodes, kept, tested = self.nodes, [self.nodes[0]], set[bytes]()
+        for before, corner, behind in zip(nodes, nodes[1:], nodes[2:], strict=False):
+            one, two = corner + CUT * (before - corner), corner + CUT * (behind - corner)
+            is_free = self._edges.is_free(one, two)
+            kept += [one, two] if is_free else [corner]
+            tested.add(one.tobytes() + two.tobytes())
+        found = np.array([*kept, nodes[-1]])
+        tested |= {a.tobytes() + b.tobytes() for a, b in itertools.pairwise(nodes)}
+        edges = itertools.pairwise(found)
+        left = [(a, b) for a, b in edges if a.tobytes() + b.tobytes() not in tested]
+        lengths = lengths_along(found)
+        if lengths[-1] < self.length and all(self._edges.is_free(a, b) for a, b in left):
+            self._before.append(self.nodes)
+            self.nodes, self.lengths = found, lengths

@@ -1,12 +1,11 @@
 """A mission in two stages: a docking place and posture, then a safe path to it.
 
-Chen & Zalzala 1995. The first stage is the placement search of section 3, the second the path
-search of section 2, whose goal is the node nearest to the docking place of the first. The motion
-follows the path from node to node, goes on to the docking place itself, and then turns the arm from
-the travel posture to the posture of the first stage.
+Chen & Zalzala 1995: the placement search of section 3, then the path search of section 2 to the
+node nearest to the docking place. The motion follows the path, goes on to the docking place itself,
+and turns the arm from the travel posture to that of the first stage.
 
 A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. Its cost is E (Eq. 14) +
-C (Eq. 1). In the first stage there is no path: the cost of the plan is inf, the individuals cost E.
+C (Eq. 1). In the first stage the cost of the plan is inf, the individuals cost E.
 """
 
 from collections.abc import Generator, Iterator
@@ -60,9 +59,8 @@ class TwoStage(PlannerDefaults, Component):
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
         """Prepare both stages."""
         if len(scenario.grid.size) != 2:
-            raise SettingError(
-                "scenario.grid.size", "of a floor, two numbers", list(scenario.grid.size)
-            )
+            must = "of a floor, two numbers"
+            raise SettingError("scenario.grid.size", must, list(scenario.grid.size))
         placement = self.placement.prepare(robot.arm(), scenario.docking)
         path = self._driving.prepare(robot.platform(), scenario.grid)
         bodies = scene(robot.build(), scenario.grid.bodies(), self_pairs=True)
@@ -77,16 +75,10 @@ class TwoStage(PlannerDefaults, Component):
         """Search the docking posture; return the placement search's last block."""
         no_path, start = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, problem.scenario.grid.start
         for block in self.placement.evolve(problem.placement, rng):
-            bests = [
-                Best(
-                    place,
-                    np.concatenate([angles, start]),
-                    np.inf,
-                    self._posture_terms(problem, angles) | no_path,
-                    False,
-                )
-                for place, angles, *_ in block.bests
-            ]
+            bests = []
+            for place, angles, *_ in block.bests:
+                plan, terms = np.concatenate([angles, start]), self._posture_terms(problem, angles)
+                bests.append(Best(place, plan, np.inf, terms | no_path, False))
             lowest = [np.inf] * block.num_generations
             yield block._replace(bests=bests, lowest=lowest, costs=block.costs[:, None])
         return block
@@ -105,10 +97,8 @@ class TwoStage(PlannerDefaults, Component):
                 if path.solution is nodes:
                     continue
                 nodes, cost = path.solution, docked.cost + path.cost
-                plan, solved = (
-                    np.concatenate([docked.solution, nodes]),
-                    docked.solved and path.solved,
-                )
+                plan = np.concatenate([docked.solution, nodes])
+                solved = docked.solved and path.solved
                 if proofs is not None and not (solved and proofs.is_proven(plan)):
                     cost, solved = np.inf, False
                 if proofs is None or best is None or solved or not best.solved:
@@ -130,9 +120,8 @@ class TwoStage(PlannerDefaults, Component):
         node = tuple(int(np.floor(value + 0.5)) for value in self.docking_place(problem, angles))
         if node == grid.goal:
             return problem.path
-        return self._driving.prepare(
-            problem.robot.platform(), type(grid)(**(dict(grid) | {"goal": node}))
-        )
+        task = type(grid)(**(dict(grid) | {"goal": node}))
+        return self._driving.prepare(problem.robot.platform(), task)
 
     @property
     def _driving(self) -> GridPathGa:
@@ -159,11 +148,9 @@ class TwoStage(PlannerDefaults, Component):
     def num_evaluations(self, index: int) -> int:
         """Return the evaluations of a generation of one of the stages."""
         first = self.placement.num_generations + 1
-        return (
-            self.placement.num_evaluations(index)
-            if index < first
-            else self.path.num_evaluations(index - first)
-        )
+        if index < first:
+            return self.placement.num_evaluations(index)
+        return self.path.num_evaluations(index - first)
 
     def _refused(self, problem: Problem, *arguments: Any) -> NoReturn:
         """Refuse: there are two populations, one per stage."""

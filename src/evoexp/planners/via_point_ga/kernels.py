@@ -1,7 +1,6 @@
 """One generation of strings of via-points, compiled (Rana & Zalzala 1995, section 3.4).
 
-Several generations are one call: between kernels, Python's own work would cost half as much as
-theirs. Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
+Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
 """
 
 from typing import Any, NamedTuple
@@ -15,9 +14,8 @@ from evoexp.evolution.succession import choose_elites, follow_rows
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
-from evoexp.paths.lengths import measure_paths
+from evoexp.paths.lengths import measure_paths, relax_points
 from evoexp.paths.redistribution import redistribute_arms
-from evoexp.paths.relaxation import relax_points
 from evoexp.paths.workspace import Redistribution
 from evoexp.records import FloatArray, IntArray
 

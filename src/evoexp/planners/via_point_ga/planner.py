@@ -15,23 +15,16 @@ from typing import ClassVar
 import numpy as np
 
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
-from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
-from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
-from evoexp.planners.arm_tasks import (
-    ArmTask,
-    arm_problem,
-    cover_notes,
-    cover_shapes,
-)
-from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
+from evoexp.planners.answers import in_shape
+from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
+from evoexp.planners.planner import COPIES, JudgementArrays, num_values
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.via_point_ga.search import ProvenSearch, Search, settle
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Problem, Strings
+from evoexp.planners.via_point_ga.strings import Problem, ProvenSearch, Search, Strings, settle
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
@@ -39,7 +32,7 @@ from evoexp.validation import Component
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
-class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
+class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4."""
 
     component: ClassVar[str] = "via_point_ga"
@@ -98,21 +91,16 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return one individual of a population as a flat solution."""
-        return np.concatenate(
-            [population[a:b, :, individual].T.ravel() for a, b in problem.arm_slices]
-        )
+        own = population[:, :, individual]
+        return np.concatenate([own[a:b].T.ravel() for a, b in problem.arm_slices])
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the joint-space motion of a solution: straight, via-points in equal times."""
-        return Motion(np.ascontiguousarray(DEGREE * self._strings_of(problem, solution).T))
-
-    def parts(self, problem: Problem, motion: Motion) -> tuple[Part, ...]:
-        """Return the whole motion; arms and obstacles have margins of their own."""
-        return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
+        return Motion(np.ascontiguousarray(DEGREE * self.path(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the named terms of a solution, and its clearances at and between via-points."""
-        strings = self._strings_of(problem, solution)
+        strings = np.ascontiguousarray(self.path(problem, solution).T)
         judged = self.cost(problem, strings[:, :, None])
         terms = judged.named_terms(0) | {"fitness": float(self.objective.fitness(judged.cost)[0])}
         squares = (problem.goal - problem.start) ** 2
@@ -139,19 +127,6 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         """Return the cost that gives the fitness (Eq. 7)."""
         return self.objective.fitness_offset - terms["fitness"]
 
-    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
-        """Compare start and goal of every arm with the task's, and angles with their limits."""
-        strings, found = self._strings_of(problem, solution), []
-        for arm, (a, b) in enumerate(problem.arm_slices):
-            for end, column, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
-                name = f"the {end} of arm {arm + 1}"
-                found += of_place(name, strings[a:b, column], wanted[a:b], "deg")
-        return found + of_limits(joint_names(len(strings)), strings, problem.limits, "deg")
-
-    def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
-        """Return the circles or spheres on the links."""
-        return cover_shapes(problem.collision)
-
     def memory(self, problem: Problem) -> int:
         """Return the memory of populations, and of the configurations tested between via-points."""
         between = 2 * (self.collision.collision_substeps - 1)
@@ -162,19 +137,13 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         """Return the documented shape of a solution: per arm, (N + 1, joints)."""
         return tuple((self.num_via_points + 1, int(b - a)) for a, b in problem.arm_slices)
 
-    def notes(self, problem: Problem) -> list[str]:
-        """Describe the covers of bodies, where bodies are covered."""
-        return cover_notes(problem.collision, problem.scene, problem.length_unit)
-
-    def _strings_of(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        """Return a flat solution as strings (nq, N + 1)."""
-        sizes = [rows * joints for rows, joints in self.shape(problem)]
-        if solution.shape != (sum(sizes),):
-            raise ValueError(f"a solution has {sum(sizes)} values, was {solution.shape}")
-        parts = np.split(solution, np.cumsum(sizes)[:-1])
-        return np.vstack(
-            [p.reshape(shape).T for p, shape in zip(parts, self.shape(problem), strict=True)]
-        )
+    def path(self, problem: Problem, solution: FloatArray) -> FloatArray:
+        """Return the strings of a flat solution, (N + 1, nq) [deg]."""
+        own, points = in_shape(solution, len(problem.start) * (self.num_via_points + 1)), []
+        for size, joints in self.shape(problem):
+            points.append(own[: size * joints].reshape(size, joints))
+            own = own[size * joints :]
+        return np.hstack(points)
 
 
 def sampled(strings: FloatArray, samples: int) -> FloatArray:

@@ -6,7 +6,6 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.bodies.covered_bodies import CoveredBodies
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
-from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.evolution.operators.breeding import Operators
 from evoexp.evolution.operators.selection import FitnessRoulette
@@ -67,9 +66,6 @@ class ViaPointSettings(Settings):
 
     @model_validator(mode="after")
     def _samples_halve(self) -> Self:
-        count = self.samples_per_segment
-        if count not in SAMPLES:
-            raise SettingError(
-                "samples_per_segment", f"one of {', '.join(map(str, SAMPLES))}", count
-            )
+        must = f"one of {', '.join(map(str, SAMPLES))}"
+        self.demand("samples_per_segment", self.samples_per_segment in SAMPLES, must)
         return self

@@ -1,8 +1,7 @@
-"""Populations of strings of via-points: the problem they solve, and the steps they go through.
+"""Populations of strings of via-points: the problem they solve, their steps, and a run of them.
 
-Strings of robots whose bodies are covered keep within the joints' limits. A generation of them goes
-through the same steps, each a call of its own: testing covered bodies takes far longer than Python
-takes between the steps.
+Strings of robots whose bodies are covered keep within the joints' limits, and each step of their
+generations is a call of its own: testing covered bodies takes far longer than Python between them.
 """
 
 from dataclasses import dataclass
@@ -24,13 +23,15 @@ from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.paths.workspace import Redistribution
 from evoexp.planners.answers import JudgementArrays
 from evoexp.planners.arm_tasks import ArmProblem
-from evoexp.planners.driver import generations_per_call
+from evoexp.planners.driver import GeneticSearch, generations_per_call
+from evoexp.planners.planner import Candidate
+from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.records import FloatArray
+from evoexp.records import Best, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from evoexp.planners.via_point_ga.search import Search
+    from evoexp.planners.via_point_ga.planner import ViaPointGa
 
 LANES = 8  # individuals are padded to whole vectors
 PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
@@ -176,34 +177,122 @@ class Strings:
         costs, collisions = np.empty((2, places, size))
         return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
 
-    def evolve(
+    def no_terms(self, strings: FloatArray, count: int) -> StringTerms:
+        """Return memory for the terms of the first `count` strings; all but costs are padded."""
+        lengths, unevenness = np.empty((2, len(self.problem.arm_slices), strings.shape[2]))
+        return StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))
+
+
+class Search(GeneticSearch):
+    """One run, and memory for its generations."""
+
+    def __init__(
         self,
-        run: "Search",  # whose operators breed and whose generations are written
-        uniforms: FloatArray,  # (generations, numbers) in [0, 1)
-        normals: FloatArray,  # normal deviates, see `breed`
-        first: int,  # the present generation
+        planner: "ViaPointGa",
+        problem: Problem,
+        strings: Strings,  # the planner's steps on this problem
+        per_call: int | None = None,  # generations computed at once; None: as many as is best
     ) -> None:
-        """Go on from a generation to those behind it (section 3.4)."""
-        (select, cross, mutate), rules = run.operators, run.breeding
-        if self.covered is None:
-            arguments = rules, self.settings, run.table, run.scratch, run.summaries
+        """Begin a run."""
+        ga, operators = planner.ga, planner.operators
+        super().__init__(ga, operators, strings.genome, per_call or strings.generations_per_call)
+        self._planner, self._problem, self._strings = planner, problem, strings
+        self.table, offspring = strings.table(self.num_places), strings.empty(ga.num_offspring)
+        terms = strings.no_terms(offspring, ga.num_offspring)
+        self.scratch = kernels.Scratch(offspring, terms, self.elites, self.parents)
+        self.costs, self._shown = self.table.costs, np.empty(self.table.strings.shape[1:])
+        self.queries_each = planner.num_via_points * planner.collision.collision_substeps
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and judge the initial population."""
+        strings, size = self._strings, self.costs.shape[1]
+        self.table.strings[:] = strings.drawn(rng, size)
+        judged = strings.judge(self.table.strings[0], size)
+        self.costs[0], self.table.collisions[0] = judged.cost, judged.terms["collisions"]
+        self._summarise(0)
+
+    def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
+        """Compute generations (section 3.4)."""
+        (select, cross, mutate), rules, own = self.operators, self.breeding, self._strings
+        if own.covered is None:
+            arguments = rules, own.settings, self.table, self.scratch, self.summaries
             kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
-            return
-        offspring, terms, elites, parents = run.scratch
-        here, there = first % len(run.summaries), (first + 1) % len(run.summaries)
+            return first + len(uniforms)
+        offspring, terms, elites, parents = self.scratch
+        here, there = first % self.num_places, (first + 1) % self.num_places
         before, after = (
-            kernels.Population(*(array[place] for array in run.table)) for place in (here, there)
+            kernels.Population(*(array[place] for array in self.table)) for place in (here, there)
         )
         choose_elites(before.costs, elites)
         genomes, out = kernels.by_gene(before.strings), kernels.by_gene(offspring)
         rest = first, rules.mutation_rate, rules, before.costs, genomes, parents, out
         breed(select, cross, mutate, uniforms[0], normals, *rest)
-        self.smooth(offspring, len(parents))
-        self.write_terms(offspring, terms)
-        kernels.follow(before, run.scratch, after)
-        kernels.summarise_strings(*after[1:], run.summaries[there])
+        own.smooth(offspring, len(parents))
+        own.write_terms(offspring, terms)
+        kernels.follow(before, self.scratch, after)
+        kernels.summarise_strings(*after[1:], self.summaries[there])
+        return first + 1
 
-    def no_terms(self, strings: FloatArray, count: int) -> StringTerms:
-        """Return memory for the terms of the first `count` strings; all but costs are padded."""
-        lengths, unevenness = np.empty((2, len(self.problem.arm_slices), strings.shape[2]))
-        return StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return a string and its terms, judged once more by itself."""
+        own = self.table.strings[place, :, :, individual, None]
+        terms = self._strings.judge(self._strings.padded(own), 1).named_terms(0)
+        solution = self._planner.solution(self._problem, own, 0)
+        return Candidate(solution, terms, terms["collisions"] == 0.0)
+
+    def population(self, index: int) -> FloatArray:
+        """Return the strings, padded, in the same array for all generations.
+
+        So the digest of a run that its budget ends is that of the first generation beyond it.
+        """
+        np.copyto(self._shown, self.table.strings[index % self.num_places])
+        return self._shown
+
+    def _summarise(self, place: int) -> None:
+        costs, collisions = self.costs[place], self.table.collisions[place]
+        kernels.summarise_strings(costs, collisions, self.summaries[place])
+
+
+class ProvenSearch(Search):
+    """A run whose best string is proven: what is refuted costs more in the next generation."""
+
+    def __init__(self, planner: "ViaPointGa", problem: Problem, strings: Strings) -> None:
+        """Begin a run, see `Search`, without any verdict."""
+        super().__init__(planner, problem, strings, per_call=1)
+        self._proofs = Proofs(planner, problem)
+
+    def improve(self, places: IntArray) -> list[Best]:
+        """Keep a proven string that costs less than the one kept, if the generation has one."""
+        (place,), keeper = places.tolist(), self.keeper
+        strings, costs, hits = (array[place] for array in self.table)
+        k = settle(self._proofs, strings, costs, hits, keeper.cost)
+        proven = np.zeros(len(costs), bool)
+        if k is not None:
+            proven[k] = True
+
+        def candidate(k: int, solved: bool) -> Candidate:
+            found = super(ProvenSearch, self).candidate(place, k)
+            found.terms["certificates"] = float(self._proofs.num_certificates)
+            return found._replace(solved=solved)
+
+        keeper.keep_proven(costs, proven, candidate)
+        self._summarise(place)
+        return [keeper.standing]
+
+
+def settle(
+    proofs: Proofs, strings: FloatArray, costs: FloatArray, hits: FloatArray, below: float = np.inf
+) -> int | None:
+    """Judge free strings (nq, N + 1, …), the cheapest first, until one is proven; return it.
+
+    None if none is, or a cost `below` is reached. One that is refuted counts as colliding at one
+    instant more, and costs as much: `costs` and `hits` (individuals,) are changed.
+    """
+    planner, problem = proofs.planner, proofs.problem
+    open_costs = np.where((hits == 0.0) & (costs < below), costs, np.inf)
+    settled = open_costs.copy()
+    proven = proofs.settle(settled, lambda k: planner.solution(problem, strings, k))
+    refuted = settled != open_costs
+    hits[refuted] += 1.0
+    costs[refuted] += planner.objective.collision_weight
+    return proven

@@ -125,7 +125,7 @@ def _judged(path: Path) -> list[list[Any]]:
         if motion is None or not (length := motion_length(motion)):
             continue
         at = log.generations[row.generation]
-        reached = at.solved or not getattr(planner, "goal_is_region", False)
+        reached = at.solved or not planner.goal_is_region
         proven = (
             bool(reached)
             and judge_motion(planner, problem, motion).certified is True

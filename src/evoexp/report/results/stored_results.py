@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from evoexp.condition import Condition, Prepared
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import WrappedPlanner
 from evoexp.records import FloatArray
 from evoexp.report.statistics.inference import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped

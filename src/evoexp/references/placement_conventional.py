@@ -44,6 +44,7 @@ class PlacementConventional(Reference):
     """
 
     component: ClassVar[str] = "placement_conventional"
+    revision: ClassVar[int] = 2  # 2: exact slopes, so fewer evaluations
 
     num_starts: LayoutCount  # number of starts
     num_steps: Count  # steps of the subgradient method

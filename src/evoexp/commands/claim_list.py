@@ -55,8 +55,10 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
     """Yield the claims of a paper, experiment by experiment, with `KEYS`.
 
     A claim that is judged under every reading, by the experiment `<paper>_claims`, is yielded from
-    there alone. Where nothing is stored, it names the command that runs its experiment.
+    there alone, and a sentence once, from the first experiment that judges it. Where nothing is
+    stored, it names the command that runs its experiment.
     """
+    known = set[str]()
     experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
     of_readings = f"{paper}_claims"
     for experiment in sorted(experiments, key=lambda name: name != of_readings):
@@ -84,4 +86,7 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
             ]
             command = f"evoexp run experiment={experiment}"
         for row in rows:
+            if row[1] in known:
+                continue
+            known.add(row[1])
             yield dict(zip(KEYS, (paper, *row, experiment, command), strict=True))

@@ -143,7 +143,7 @@ class Hearing(NamedTuple):
         if kind != self.rule.kind:
             raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
         # a comparison without a pair of runs
-        reason = self.reason or ("nothing to compare" if n in (None, "0") else "")
+        reason = self.reason or ("nothing to compare" if n in (None, 0, "0") else "")
         if reason:
             return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
         verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else UNDECIDED

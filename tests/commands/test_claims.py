@@ -15,7 +15,7 @@ from evoexp.report.statistics.claim_rules import registered_rules
 def test_a_claim_that_nothing_was_run_for_names_the_command(evoexp: Evoexp) -> None:
     said = evoexp("claims", "lavoie")
     assert said.code == 0 and "{" not in said.out
-    assert "evoexp run experiment=lavoie_7dof" in said.out and "not run" in said.out
+    assert "evoexp run experiment=lavoie_controls" in said.out and "not run" in said.out
 
 
 def test_a_claim_is_traced_to_rule_numbers_and_n(evoexp: Evoexp, outputs: Path) -> None:

@@ -22,11 +22,12 @@ def new_batch(
     outputs: Path,
     *wanted: tuple[Condition, int],
     retry_failed: bool = False,
+    curves: Path | None = None,
     **settings: Any,
 ) -> Batch:
     runner = RunnerSettings(**{"num_workers": 1} | settings)
     conditions = [(condition, count, {"label": "test"}) for condition, count in wanted]
-    return Batch(conditions, runner, outputs, retry_failed=retry_failed)
+    return Batch(conditions, runner, outputs, retry_failed=retry_failed, curves=curves)
 
 
 def run(outputs: Path, *wanted: tuple[Condition, int], **settings: Any) -> list[Outcome]:

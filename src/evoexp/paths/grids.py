@@ -84,7 +84,7 @@ def grid(blocked: BoolArray) -> Grid:
     changes = np.array([sum(map(abs, move)) for move in moves], dtype=np.int32)
     rows = [np.where(_permitted(free, move), _moved(nodes, move), -1).ravel() for move in moves]
     # how far each move leads in the order of the nodes
-    apart = np.abs(np.array(moves) @ nodes.strides) // nodes.itemsize
+    apart = np.abs((np.array(moves) * nodes.strides).sum(axis=1)) // nodes.itemsize
     kinds = np.zeros(apart.max() + 1, dtype=np.int32)
     kinds[apart] = changes
     coordinates = np.ascontiguousarray(np.argwhere(nodes >= 0).astype(np.int32) - 1)

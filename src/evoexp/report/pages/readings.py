@@ -130,7 +130,7 @@ def over_readings(first: str, others: Iterable[str]) -> str:
     """
     verdicts = [first, *others]
     judged = [verdict for verdict in verdicts if not verdict.startswith(NOT_JUDGED)]
-    if first.startswith(NOT_JUDGED) or len(verdicts) == 1:
+    if not judged or len(verdicts) == 1:
         return first
     counts = Counter(judged)
     decided = [word for word in counts if word != UNDECIDED]

@@ -107,7 +107,9 @@ class Hearing(NamedTuple):
         """Return the claim unjudged: another experiment judges it, or nothing can."""
         return self.made(evidence, "–", NOT_JUDGED)
 
-    def _share(self, name: str, holds: int, done: int, neutral: float) -> EffectSize:
+    def _share(self, name: str, holds: int, done: int, neutral: float) -> EffectSize | None:
+        if not done:
+            return None
         own = Proportion(holds, done)
         return EffectSize(name, own.share, *own.interval(1.0 - self.significance), neutral)
 
@@ -143,7 +145,7 @@ class Hearing(NamedTuple):
         if kind != self.rule.kind:
             raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
         # a comparison without a pair of runs
-        reason = self.reason or ("nothing to compare" if n in (None, 0, "0") else "")
+        reason = self.reason or ("nothing to compare" if n in (None, "0") else "")
         if reason:
             return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
         verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else UNDECIDED

@@ -34,9 +34,8 @@ def test_generations_are_starts_and_sweeps_as_a_slow_version_makes_them(
 def test_where_more_are_to_be_evaluated_fresh_samples_join() -> None:
     words = "experiment=rana_planar", "control=multi_start", "ga.num_generations=2"
     planner, problem = composed(*words).prepare()
-    growing = type(
-        "Growing", (), {"answers_are_proven": False}
-    )  # a planner whose generations grow by three individuals
+    # a planner whose generations grow by three individuals
+    growing = type("Growing", (), {"answers_are_proven": False})
     for name in ("sample", "improve", "cost", "solution", "num_generations"):
         setattr(growing, name, getattr(planner.planner, name))
     growing.num_evaluations = staticmethod(lambda index: 5 + 3 * index)

@@ -72,6 +72,9 @@ def judged(kind: str, *arguments: Any, significance: float = 0.05) -> str:
         ("greater", ("", Proportion(1000, 1000), Proportion(998, 1000)), UNDECIDED),
         ("greater", ("", EMPTY, Proportion(1, 1)), UNDECIDED),
         ("greater", ("", Proportion(5, 10), Proportion(5, 10), 0.01), UNDECIDED),  # p of a family
+        ("own", ("", 20, np.True_), REPRODUCED),
+        ("own", ("", 20, np.False_), CONTRADICTED),
+        ("own", ("", 20, None), UNDECIDED),
     ],
 )
 def test_a_claim_is_judged_by_its_kind(kind: str, arguments: Any, verdict: str) -> None:

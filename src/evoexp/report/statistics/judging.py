@@ -101,7 +101,8 @@ class Hearing(NamedTuple):
         self, evidence: Evidence, n: object, holds: bool | None, size: EffectSize | None = None
     ) -> Claim:
         """Judge a claim by a rule of its own; n runs, or whatever was counted; None: undecided."""
-        return self._claim(OWN, evidence, n, holds is True, holds is False, size)
+        decided = holds is not None
+        return self._claim(OWN, evidence, n, decided and bool(holds), decided and not holds, size)
 
     def elsewhere(self, evidence: Evidence) -> Claim:
         """Return the claim unjudged: another experiment judges it, or nothing can."""

@@ -55,8 +55,8 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
     """Yield the claims of a paper, experiment by experiment, with `KEYS`.
 
     A claim that is judged under every reading, by the experiment `<paper>_claims`, is yielded from
-    there alone, and a sentence once, from the first experiment that judges it. Where nothing is
-    stored, it names the command that runs its experiment.
+    there alone, and a sentence once, from the first experiment that judges it. Where a condition
+    has no run, it names the command that runs its experiment.
     """
     known = set[str]()
     experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
@@ -70,7 +70,10 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
         try:
             (expanded,) = compose.expand([f"experiment={experiment}"])
             request, settings, num_replicates = request_of(expanded, [])
-            claims = page_of(request.results(outputs_root(), num_replicates), settings).claims
+            results = request.results(outputs_root(), num_replicates)
+            if len(results.with_data) < len(results.conditions):
+                raise NothingStored(experiment)  # of all conditions: claims compare them
+            claims = page_of(results, settings).claims
             rows = [
                 (c.name, c.text, c.source, c.rule, c.evidence, str(c.size or "–"), c.n, c.verdict)
                 for c in claims

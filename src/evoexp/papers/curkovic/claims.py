@@ -23,6 +23,7 @@ Rows = tuple[Comparison, ...]
 Conditions = Sequence[ConditionResults]
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))  # with a hall, and without
 EFFORT = "evaluations to a team whose cost is the threshold"
+TWINS = dict(PAIRS)
 METHOD, ELITES = "V", "15 elites"
 KEPT = "least distance of an end-effector from another robot's links"
 
@@ -217,7 +218,7 @@ def motion_words(condition: ConditionResults, radius_conditions: Conditions) -> 
 
 def with_hall(results: Results) -> Results:
     """Return the results of the methods with a hall, under all numbers."""
-    treated = (c for c in results.conditions if _method(c) in dict(PAIRS))
+    treated = (c for c in results.conditions if _method(c) in TWINS)
     return results._replace(conditions=tuple(treated))
 
 
@@ -234,16 +235,16 @@ def effort(condition: ConditionResults, settings: ReportSettings) -> FloatArray:
 def assumed_faster(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
     """Judge a method with a hall against its twin without, under the same numbers."""
     method = _method(condition)
-    pair = f": {method} against {dict(PAIRS)[method]}"
+    pair = f": {method} against {TWINS[method]}"
     hearing = judge.on("faster", who="", measure=EFFORT, pair=pair)
     values = partial(effort, settings=judge.settings)
-    twin = _twin(results, condition, dict(PAIRS)[method])
+    twin = _twin(results, condition, TWINS[method])
     return hearing.better(judge.compared(condition, twin, values) if twin else None, "lower")
 
 
 def assumed_refuted(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
     """Judge the share of refuted motions beside that of the twin without a hall."""
-    plain = dict(PAIRS)[_method(condition)]
+    plain = TWINS[_method(condition)]
     twin = _twin(results, condition, plain)
     known = (measures.defects(c).refuted if c else Proportion(0, 0) for c in (condition, twin))
     own, others = known

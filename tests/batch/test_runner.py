@@ -13,14 +13,20 @@ from batch_samples import WORDS, digests, failures, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
 
-import evoexp.batch.warm_kernels as warm_kernels_module
+import evoexp.batch.jobs as jobs_module
 from evoexp.batch import jobs, live_curves
 from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates
-from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
+from evoexp.batch.jobs import (
+    NO_LIMITS,
+    Job,
+    Outcome,
+    one_of_each_kind,
+    run_jobs,
+    warm_kernels,
+)
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits
-from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import DamagedStore
@@ -288,7 +294,7 @@ def test_what_fails_or_takes_too_long_is_left_to_the_replicates(
     fault: str, faulty: Condition, fail: Fail, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fail(fault)
-    monkeypatch.setattr(warm_kernels_module, "COMPILING_S", 1.0)
+    monkeypatch.setattr(jobs_module, "COMPILING_S", 1.0)
     begun = time.monotonic()
     warm_kernels([job(faulty)], ReplicateLimits(timeout_s=0.1))
     assert time.monotonic() - begun < 60.0

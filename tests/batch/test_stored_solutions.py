@@ -15,8 +15,7 @@ from mcap.opcode import Opcode
 
 from composed import composed
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduction import reproduce_log, stored_condition
-from evoexp.batch.stored_solutions import contradictions
+from evoexp.batch.reproduction import contradictions, reproduce_log, stored_condition
 from evoexp.errors import CorruptLog
 from evoexp.store.integrity import LogCheck, check_log
 from evoexp.store.log import SUMMARY, array_file

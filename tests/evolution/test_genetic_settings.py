@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.planners.coevolution.settings import CoevolutionSettings
-from evoexp.planners.posture_es.settings import StrategySettings
+from evoexp.planners.posture_es.cycles import StrategySettings
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
 from evoexp.validation import Component, build
 

@@ -1,9 +1,17 @@
-"""Replicates as tasks of worker processes: a `Job` goes out, an `Outcome` comes back."""
+"""Replicates as tasks of worker processes: a `Job` goes out, an `Outcome` comes back.
 
+Kernels of conditions are compiled, or loaded, before their replicates are timed: each kind of
+condition searches for two generations and judges a motion; the server of worker processes does so
+before it forks them.
+"""
+
+import contextlib
 import functools
+import itertools
+import re
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,10 +19,12 @@ from evoexp.attachments import keep_all
 from evoexp.batch.live_curves import CurveFile
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.condition import Condition
-from evoexp.records import ReplicateSummary
+from evoexp.records import ReplicateSummary, generations
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
+COMPILING_S = 600.0  # [s] that a short call may take; replicates that compile would be late, too
+_NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 class Job(NamedTuple):
@@ -92,3 +102,30 @@ def condition_of(job: Job) -> Condition:
 def _condition(config_json: bytes) -> Condition:
     """Build a condition once per process: checking it takes as long as a short run."""
     return Condition.from_json(config_json)
+
+
+def one_of_each_kind(jobs: Iterable[Job]) -> list[Job]:
+    """Return jobs that need all kernels that any needs: numbers make no difference."""
+    texts = {job.condition_json: job for job in jobs}
+    return list({_NUMBER.sub(b"0", text): job for text, job in texts.items()}.values())
+
+
+def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
+    """Run every kernel that the conditions of jobs need; errors are left to the replicates."""
+    from evoexp.paths.motion import Motion  # and numba
+    from evoexp.planners.proofs import judge_motion
+
+    limits = limits._replace(timeout_s=max(limits.timeout_s or 0.0, COMPILING_S))
+    for job in jobs:
+        with contextlib.suppress(Exception), limited(limits, in_worker=False):
+            condition = condition_of(job)
+            planner, problem = condition.prepare()
+            # a reference takes long; it needs the kernels of the planner beside it
+            searching = planner.planner if condition.is_reference else planner
+            search = generations(searching.evolve(problem, condition.rng(0)))
+            *_, solution = [generation.best.copy() for generation in itertools.islice(search, 2)]
+            searching.evaluate(problem, solution)
+            motion = searching.motion(problem, solution)
+            judge_motion(searching, problem, motion)
+            if motion is not None:  # what touches nothing needs the kernels of the closest approach
+                judge_motion(searching, problem, Motion(motion.q[[0, 0]]))

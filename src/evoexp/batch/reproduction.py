@@ -1,4 +1,4 @@
-"""Runs stored replicates again and compares: MATCH, or the first generation that differs.
+"""Runs or evaluates stored replicates again and compares them with their logs.
 
 Two things are compared: the search, link by link of the chain, and everything else that a log
 holds but times. In an equal environment both must agree to the bit, elsewhere numbers to
@@ -17,7 +17,8 @@ from evoexp.attachments import PREFIX, keep_all
 from evoexp.batch.memory_limit import machine_memory, refuse_large
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.condition import Condition
-from evoexp.errors import CorruptLog, MissingDistribution
+from evoexp.errors import CorruptLog, EvoexpError, MissingDistribution
+from evoexp.planners.proofs import judge_motion
 from evoexp.records import TIMES, ReplicateSummary, flatten
 from evoexp.registry import missing
 from evoexp.store.digests import array_bytes
@@ -37,6 +38,8 @@ _UNDECIDED = ("clearance_at", "clearance_pair", "penetration_pair", "certificate
 _COST = "cost "  # begins a fingerprint that is no digest
 _PLAIN = (str, int, float, type(None))  # values of which a difference is told
 _LONGEST = 60  # characters of one
+LARGEST = 1e7  # of a solution's numbers, as of those of robots and scenarios, in any unit
+_UNFIT = (ValueError, ArithmeticError, LookupError, EvoexpError)  # raised by numbers of no solution
 
 
 class FieldDifference(NamedTuple):
@@ -282,3 +285,55 @@ def same_fingerprint(one: str, two: str) -> bool:
         costs = [float(text.removeprefix(_COST)) for text in (one, two)]
         return difference(*costs) <= TOLERANCE
     return one == two
+
+
+def contradictions(path: Path, log: LogContents) -> Iterator[str]:
+    """Yield the contradictions between a log's solutions and the costs, terms and verdict it tells.
+
+    The search is not run again: fronts, arrays and statistics of populations need `compare`.
+    EvoexpError is raised where they cannot be evaluated here: another revision, a missing package.
+    """
+    condition = stored_condition(path, log)
+    refuse_large(condition, machine_memory())
+    with np.errstate(all="ignore"):
+        yield from map(str, _contradictions(*condition.prepare(), log))
+
+
+def _contradictions(planner: Any, problem: Any, log: LogContents) -> Iterator[FieldDifference]:
+    rows = {row.index: row for row in log.generations}
+    terms: Mapping[str, float] = {}
+    for solution in log.solutions:
+        name = f"solution of generation {solution.generation}"
+        row = rows.get(solution.generation)
+        if row is None:
+            yield FieldDifference(name, "there", "of no generation of the log", math.inf)
+            return
+        yield from differing({"cost": solution.cost}, {"cost": row.best_cost}, f"{name}: ")
+        try:
+            if not (np.abs(solution.values) <= LARGEST).all():  # NaN, too
+                raise ValueError(f"its numbers must be finite and at most {LARGEST:g}")
+            terms = planner.evaluate(problem, solution.values)
+        except _UNFIT as error:
+            if not isinstance(error, EvoexpError) or math.isfinite(solution.cost):
+                yield FieldDifference(name, "there", f"none: {error}", math.inf)
+                return
+            continue  # what costs inf may be no solution at all
+        yield from _unlike(row.terms, terms, f"{name}: ")
+        cost = float(planner.cost_of_terms(terms))
+        if math.isfinite(solution.cost) and not math.isnan(cost):
+            yield from _unlike({"cost": solution.cost}, {"cost": cost}, f"{name}: ")
+    yield from _unlike(log.summary.terms, terms, "last solution: ")
+    # the motion is judged last: that of a replaced solution might take very long
+    last = log.solutions[-1].values
+    verdict = judge_motion(planner, problem, planner.motion(problem, last))._asdict()
+    yield from _unlike(flatten(log.summary), verdict, "motion of the last solution: ")
+
+
+def _unlike(
+    stored: Mapping[str, Any], again: Mapping[str, Any], prefix: str
+) -> Iterator[FieldDifference]:
+    """Yield the fields of both that differ by more than rounding."""
+    shared = {name: again[name] for name in again if name in stored}
+    for each in differing({name: stored[name] for name in shared}, shared):
+        if not each.is_close:
+            yield each._replace(name=prefix + each.name)

@@ -9,11 +9,10 @@ from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from evoexp.batch.jobs import Job, Outcome
+from evoexp.batch.jobs import Job, Outcome, one_of_each_kind, warm_kernels
 from evoexp.batch.memory_limit import GIGABYTE, allowed_memory, refuse_large
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests

@@ -87,7 +87,7 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
 
 
 def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:
-    from evoexp.batch.stored_solutions import contradictions  # planners, which take long to load
+    from evoexp.batch.reproduction import contradictions  # planners, which take long to load
 
     return [check_log(path, condition_id, contradictions) for path in paths]
 

@@ -13,17 +13,13 @@ def state_bytes(bit_generator: Any) -> bytes:
 
     All are little-endian. TypeError: the generator is no PCG64.
     """
-    demand_pcg64(bit_generator)
+    if not isinstance(bit_generator, np.random.PCG64):
+        raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")
     state: Any = bit_generator.state
     words = state["state"]
     half = state["has_uint32"] | state["uinteger"] << 32
-    return b"".join(
-        (
-            words["state"].to_bytes(16, "little"),
-            words["inc"].to_bytes(16, "little"),
-            half.to_bytes(8, "little"),
-        )
-    )
+    parts = (words["state"], 16), (words["inc"], 16), (half, 8)
+    return b"".join(number.to_bytes(size, "little") for number, size in parts)
 
 
 def states_behind(state: bytes, counts: Iterable[int]) -> list[bytes]:
@@ -38,9 +34,3 @@ def states_behind(state: bytes, counts: Iterable[int]) -> list[bytes]:
         generator.advance(int(count))
         states.append(state_bytes(generator)[:STATE_SIZE] + rest)
     return states
-
-
-def demand_pcg64(bit_generator: Any) -> None:
-    """Refuse other bit generators, whose states have other layouts, by a TypeError."""
-    if not isinstance(bit_generator, np.random.PCG64):
-        raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")

@@ -8,8 +8,7 @@ import pinocchio as pin
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.ordered_sums import length
-from evoexp.numeric.rotations import rotation_matrix
+from evoexp.numeric.ordered_sums import length, rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 

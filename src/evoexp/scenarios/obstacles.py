@@ -6,8 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.ordered_sums import length, matrix_product
-from evoexp.numeric.rotations import rotation_matrix
+from evoexp.numeric.ordered_sums import length, matrix_product, rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 

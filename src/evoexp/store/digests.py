@@ -7,7 +7,7 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from evoexp.numeric.generator_state import demand_pcg64, state_bytes
+from evoexp.numeric.generator_state import state_bytes
 
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 
@@ -16,9 +16,9 @@ class Chain:
     """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state)."""
 
     def __init__(self, rng: "np.random.Generator") -> None:
-        """Start a chain, its link being empty."""
-        demand_pcg64(rng.bit_generator)
+        """Start a chain, its link being empty; TypeError: the generator is no PCG64."""
         self._rng, self.link = rng, b""
+        self.state()
 
     def state(self) -> bytes:
         """Return the state of the generator now."""

@@ -15,9 +15,8 @@ from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummar
 from evoexp.store.digests import Chain, ContentDigest, array_bytes
 from evoexp.store.log_bounds import MAX_LOG
 from evoexp.store.messages import (
-    encode_front,
+    encode,
     encode_generation,
-    encode_solution,
     encode_summary,
     encode_values,
     json_schema,
@@ -145,8 +144,11 @@ class Log:
             self._attach(name + ARRAY, array_file(array))
         if block.criteria is not None:
             for population, criteria in enumerate(block.criteria):
-                front = encode_front(FrontRow(self._last, population, criteria.T))
-                self._add(FRONT_TOPIC, FrontRow, self._last, front)
+                # a matrix travels flat, beside the number of its columns
+                flat = np.ascontiguousarray(criteria.T, dtype=np.float64).reshape(-1)
+                front = {"generation": self._last, "population": population}
+                data = encode(front | {"criteria": flat, "num_criteria": len(criteria)})
+                self._add(FRONT_TOPIC, FrontRow, self._last, data)
 
     def finish(self, summary: ReplicateSummary) -> Finished:
         """Close the log; return its bytes and the summary, which gets its digest."""
@@ -161,8 +163,8 @@ class Log:
 
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost
-        data = encode_solution(index, self._best_cost, np.frombuffer(self._best))
-        self._add(SOLUTION_TOPIC, SolutionRow, index, data)
+        row = SolutionRow(int(index), float(self._best_cost), np.frombuffer(self._best))
+        self._add(SOLUTION_TOPIC, SolutionRow, index, encode(row._asdict()))
 
     def _attach(self, name: str, data: bytes) -> None:
         kind = "application/json" if name.endswith(".json") else "application/octet-stream"

@@ -26,7 +26,6 @@ from evoexp.store.messages import (
     TERM,
     decode,
     decode_environment,
-    decode_summary,
     decode_values,
     field_types,
     restore,
@@ -94,7 +93,8 @@ def _opened(source: Source) -> Iterator[CheckedLog]:
 
 def _summary(log: CheckedLog, place: Place | None) -> ReplicateSummary:
     """Return the summary of a log, which must be of its own run, and of a place."""
-    summary, run = decode_summary(log.metadata(written.SUMMARY)), log.records[written.RUN]
+    values, run = decode_values(log.metadata(written.SUMMARY)), log.records[written.RUN]
+    summary = decode(ReplicateSummary, values)
     own = (summary.condition, summary.replicate)
     if own != (run["condition"], int(run["replicate"])):
         raise CorruptLog(f"{log.name}: altered: its summary is of another replicate")

@@ -66,19 +66,7 @@ def encode_generation(row: GenerationRow) -> bytes:
     values = {name: kind(getattr(row, name)) for name, kind in field_types(GenerationRow).items()}
     chain = values.pop("chain")
     terms = {TERM + name: float(row.terms[name]) for name in sorted(row.terms)}
-    return _encode({**values, **terms, "chain": chain})
-
-
-def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
-    """Return the message of one solution; `values` is flat."""
-    return _encode({"generation": int(generation), "cost": float(cost), "values": values})
-
-
-def encode_front(front: FrontRow) -> bytes:
-    """Return the message of one front; its criteria travel flat, beside their number."""
-    flat = np.ascontiguousarray(front.criteria, dtype=np.float64)
-    row = {"generation": int(front.generation), "population": int(front.population)}
-    return _encode(row | {"criteria": flat.reshape(-1), "num_criteria": int(flat.shape[1])})
+    return encode({**values, **terms, "chain": chain})
 
 
 def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
@@ -107,13 +95,11 @@ def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
     return environment
 
 
-def decode_summary(metadata: Mapping[str, str]) -> ReplicateSummary:
-    """Undo `encode_summary`; keys that are no field of the summary are left out."""
-    return decode(ReplicateSummary, decode_values(metadata))
-
-
 def decode(record: type[Row], row: dict[str, Any]) -> Row:
-    """Build a record from the decoded JSON of its message, or raise an error if it is none."""
+    """Build a record from the decoded JSON of its message, or raise an error if it is none.
+
+    Keys that are no field of the record are left out.
+    """
     if NONFINITE in row:
         restore(row)
     fields: dict[str, Any] = {}
@@ -140,7 +126,8 @@ def decode(record: type[Row], row: dict[str, Any]) -> Row:
     return record(**fields)
 
 
-def _encode(row: dict[str, Any]) -> bytes:
+def encode(row: dict[str, Any]) -> bytes:
+    """Return a message; numbers are Python's, arrays flat."""
     text = orjson.dumps(row, option=orjson.OPT_SERIALIZE_NUMPY)
     if b"null" in text:  # a number is not finite
         return orjson.dumps(flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)

@@ -1,8 +1,10 @@
 """The evolution strategy on postures, cycle by cycle (Corsépius 2001, section 4.2)."""
 
 from collections.abc import Callable
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import standard_normal
@@ -18,33 +20,59 @@ from evoexp.planners.posture_es.kernels import (
     Strategy,
 )
 from evoexp.planners.posture_es.phases import Problem, Stage
-from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.records import FloatArray, IntArray
+from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
 
 
-class Ancestry:
-    """Postures that became parents, and of each its own parent: the paths of all individuals."""
+class StrategySettings(Component):
+    """A (μ, λ) or (μ + λ) evolution strategy."""
 
-    def __init__(self, start: FloatArray) -> None:
-        """Begin with the start (nq,) as node 0."""
-        self._postures, self._parents = [start], [-1]
+    component: ClassVar[str] = "strategy"
 
-    def append(self, posture: FloatArray, parent: int) -> int:
-        """Append the child (nq,) of a node; return its own node."""
-        self._postures.append(posture)
-        self._parents.append(parent)
-        return len(self._parents) - 1
+    num_parents: Count  # μ: individuals selected for the next cycle
+    num_offspring: Count  # λ: individuals generated per cycle
+    initial_size: Count  # individuals generated in the first cycle, from the start alone
+    # individuals added at random per cycle (Algorithm 1, the set Q)
+    num_immigrants: NonNegativeCount
+    num_generations: NonNegativeCount  # cycles per phase of a task, at most
+    patience: Count  # cycles without improvement after which the search is given up
+    # `comma`: the next parents are offspring; `plus`: parents may stay
+    selection: Literal["comma", "plus"]
+    # `uniform` in a box of ±scope around the parent; `gaussian` with the standard deviation
+    # below
+    mutation: Literal["uniform", "gaussian"]
+    mutation_std: Positive  # of Gaussian mutation, in units of the scope [-]
+    # `equal` shares for all parents, or `gaussian`: the better the rank the more offspring
+    parent_choice: Literal["equal", "gaussian"]
+    parent_std: Positive  # of Gaussian parent choice, in units of μ [-]
+    crossover_rate: Rate  # probability that a child takes every joint from one of two parents
 
-    def posture(self, node: int) -> FloatArray:
-        """Return the posture of a node, (nq,)."""
-        return self._postures[node]
+    @model_validator(mode="after")
+    def _parents_fit(self) -> Self:
+        fits = self.num_parents <= self.num_offspring + self.num_immigrants
+        must = f"at most num_offspring ({self.num_offspring}) with comma selection"
+        self.demand("num_parents", fits or self.selection == "plus", must)
+        return self
 
-    def path(self, node: int) -> FloatArray:
-        """Return the postures from the first ancestor to a node, (postures, nq)."""
-        line = []
-        while node >= 0:
-            line.append(self._postures[node])
-            node = self._parents[node]
+    @property
+    def population_size(self) -> int:
+        """Individuals judged before the first cycle: the start."""
+        return 1
+
+
+class Node(NamedTuple):
+    """A posture that became a parent, and its own parent: its line of ancestors is a path."""
+
+    posture: FloatArray  # (nq,)
+    parent: "Node | None" = None  # None: of the start
+
+    def path(self) -> FloatArray:
+        """Return the postures from the first ancestor on, (postures, nq)."""
+        line: list[FloatArray] = []
+        node: Node | None = self
+        while node is not None:
+            line.append(node.posture)
+            node = node.parent
         return np.array(line[::-1])
 
 
@@ -57,13 +85,12 @@ class Search:
         problem: Problem,  # the prepared task
         stage: Stage,
         edge_check: int,  # as in `kernels.Strategy`
-        ancestry: Ancestry,  # of all phases
-        node: int,  # where the phase begins
+        node: Node,  # where the phase begins
         # whether a parent (nq,) may have a child (nq,); None: any
         accepts: Callable[[FloatArray, FloatArray], bool] | None = None,
     ) -> None:
         """Begin a phase."""
-        self.ga, self._judging, self.ancestry, self._accepts = ga, stage.judging, ancestry, accepts
+        self.ga, self._judging, self._accepts = ga, stage.judging, accepts
         self._strategy = Strategy(
             problem.scope * stage.phase.scope_share,
             problem.limits,
@@ -76,7 +103,7 @@ class Search:
             edge_check,
         )
         # the posture that the phase begins with is judged, and is the first parent
-        self.offspring = ancestry.posture(node)[:, None].copy()  # (nq, individuals) of a cycle
+        self.offspring = node.posture[:, None].copy()  # (nq, individuals) of a cycle
         judged = stage.judge(self.offspring)
         costs = np.full(ga.num_parents, judged.cost[0])
         self._members = Members(np.repeat(self.offspring, ga.num_parents, axis=1), costs, 1)
@@ -123,7 +150,7 @@ class Search:
         improved = bool(usable[least] < self.least)
         best, new = winner if winner >= 0 else least, set(chosen[chosen < count].tolist())
         new |= {best} if improved or winner >= 0 else set()
-        born = {n: self.ancestry.append(offspring[:, n].copy(), nodes[origin[n]]) for n in new}
+        born = {n: Node(offspring[:, n].copy(), nodes[origin[n]]) for n in new}
         if len(chosen):
             postures, costs, _ = self._members
             size = len(chosen)

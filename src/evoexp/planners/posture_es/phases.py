@@ -14,7 +14,7 @@ from evoexp.collision.bodies.body_models import BodyModel, Carried
 from evoexp.collision.covers.body_covers import Cover
 from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.rotations import rotation_matrix
+from evoexp.numeric.ordered_sums import rotation_matrix
 from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim, PostureCost
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
@@ -110,7 +110,6 @@ class Problem:
     start: FloatArray  # (nq,) [rad]
     limits: FloatArray  # (nq, 2) [rad]
     scope: FloatArray  # (nq,) of a step [rad]
-    scene: Scene | None  # the bodies themselves in the first phase
     security_margin: float  # clearance that the task requires [length unit]
     memory: dict[Any, Any]  # stages that begin with nothing moved, made once
 
@@ -183,31 +182,12 @@ class Problem:
 
     def scene_of(self, stage: Stage) -> Scene:
         """Return the bodies of a phase, for the exact verdict."""
-        held, poses, grasp = stage.situation.held, stage.situation.poses, stage.situation.grasp
-        key = stage.phase.contacts, held, grasp.tobytes(), poses.tobytes()
-        if key not in self.memory:
-            self.memory[key] = self.scene_in(stage.phase, stage.situation)
-        bodies: Scene = self.memory[key]
-        return bodies
-
-    @property
-    def first_situation(self) -> Situation:
-        """All objects where the scenario puts them."""
-        table = self.obstacles
-        return Situation(np.hstack([table.rotation, table.center]), -1, IDENTITY)
-
-    def placed_obstacles(self, situation: Situation) -> ObstacleTable:
-        """Return the obstacles in a situation; a held object stands where it was taken."""
-        poses = situation.poses
-        return self.obstacles._replace(rotation=poses[:, :9].copy(), center=poses[:, 9:].copy())
-
-    @property
-    def allowed_penetration(self) -> float:
-        """How deep pairs that may touch may overlap [length unit]."""
-        return self.task.allowed_penetration or 0.0
-
-    def scene_in(self, phase: Phase, situation: Situation) -> Scene:
-        """Return the bodies of a phase, for the exact verdict."""
+        phase, situation = stage.phase, stage.situation
+        poses, held, grasp = situation
+        key = phase.contacts, held, grasp.tobytes(), poses.tobytes()
+        if key in self.memory:
+            scene: Scene = self.memory[key]
+            return scene
         assembly, names = self.assembly, [*self.bodies.names, *self.task.names]
         geometry, items = pin.GeometryModel(), assembly.geometry.geometryObjects
         placed = [(item.parentJoint, item.placement, item.geometry) for item in items]
@@ -232,7 +212,34 @@ class Problem:
             else:
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
         scene = geometry_scene(assembly.model, geometry, assembly.table)
-        return scene._replace(contacts=tuple(contacts))
+        scene = self.memory[key] = scene._replace(contacts=tuple(contacts))
+        return scene
+
+    @property
+    def first_stage(self) -> Stage:
+        """The first phase, begun at the start."""
+        return self.begin(0, self.start, self.first_situation)
+
+    @property
+    def scene(self) -> Scene:
+        """The bodies themselves in the first phase."""
+        return self.scene_of(self.first_stage)
+
+    @property
+    def first_situation(self) -> Situation:
+        """All objects where the scenario puts them."""
+        table = self.obstacles
+        return Situation(np.hstack([table.rotation, table.center]), -1, IDENTITY)
+
+    def placed_obstacles(self, situation: Situation) -> ObstacleTable:
+        """Return the obstacles in a situation; a held object stands where it was taken."""
+        poses = situation.poses
+        return self.obstacles._replace(rotation=poses[:, :9].copy(), center=poses[:, 9:].copy())
+
+    @property
+    def allowed_penetration(self) -> float:
+        """How deep pairs that may touch may overlap [length unit]."""
+        return self.task.allowed_penetration or 0.0
 
     def surroundings(
         self, phase: Phase, situation: Situation

@@ -32,11 +32,10 @@ from evoexp.planners.answers import CoverShape, Listing, in_shape, of_postures
 from evoexp.planners.arm_tasks import cover_shapes
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
-from evoexp.planners.posture_es.cycles import Ancestry, Search
+from evoexp.planners.posture_es.cycles import Node, Search, StrategySettings
 from evoexp.planners.posture_es.kernels import COST
 from evoexp.planners.posture_es.phases import Problem, Span, Stage
 from evoexp.planners.posture_es.problem import prepare
-from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
@@ -78,12 +77,11 @@ class PostureEs(PlannerDefaults, Component):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
         paths = _Paths(self, problem)
-        ancestry, node = Ancestry(problem.start), 0
-        situation = problem.first_situation
+        node, situation = Node(problem.start), problem.first_situation
         for index in range(len(problem.phases)):
-            stage = problem.begin(index, ancestry.posture(node), situation)
+            stage = problem.begin(index, node.posture, situation)
             accepts = self._proves(problem, stage) if self.answers_are_proven else None
-            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node, accepts)
+            search = Search(self.ga, problem, stage, self.edge_check, node, accepts)
             last = index == len(problem.phases) - 1
             while True:
                 reason = search.stop_reason
@@ -95,7 +93,7 @@ class PostureEs(PlannerDefaults, Component):
             if not search.won:
                 return
             node = search.best
-            situation = problem.finish(stage, ancestry.posture(node))
+            situation = problem.finish(stage, node.posture)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures uniform within the joint limits, (nq, count)."""
@@ -104,8 +102,7 @@ class PostureEs(PlannerDefaults, Component):
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge postures (nq, individuals) by the first phase."""
-        stage = problem.begin(0, problem.start, problem.first_situation)
-        judged = stage.judge(population)
+        judged = problem.first_stage.judge(population)
         if self.answers_are_proven:
             met = np.where(judged.met, judged.cost, np.inf)
             Proofs(self, problem).settle(met, lambda k: self.solution(problem, population, k))
@@ -220,7 +217,7 @@ class _Paths:
 
     def __init__(self, planner: PostureEs, problem: Problem) -> None:
         self._planner, self._problem, self._keeper = planner, problem, Keeper()
-        self._node, self._path, self._cycles = -1, {"": 0.0}, 0
+        self._node, self._path, self._cycles = Node(problem.start), dict[str, float](), 0
         self._chosen = planner.chosen
 
     def record(self, search: Search, phase: int, stop_reason: str) -> Block:
@@ -230,8 +227,8 @@ class _Paths:
         self._cycles += min(search.cycles, 1)
         # the best so far
         solution = keeper.best.solution
-        if search.best != self._node:
-            postures = search.ancestry.path(search.best)
+        if search.best is not self._node:
+            postures = search.best.path()
             solution, self._node = postures.ravel(), search.best
             self._path = path_terms(postures, problem.scope)
         counts = {"phase": phase + 1.0, "cycles": float(self._cycles)}

@@ -21,7 +21,7 @@ from evoexp.objectives.posture_cost import (
     PostureCost,
 )
 from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
-from evoexp.planners.posture_es.phases import Judged, Problem
+from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import local_pose
@@ -52,7 +52,7 @@ def prepare(
     collision: CollisionModel,
 ) -> Problem:
     """Return the problem of a task; a SettingError names what contradicts robot, goals or terms."""
-    assembly = _built(robot)
+    assembly = robot.build()
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
     _demand(assembly.num_arms == 1, "robot", "one arm", f"{assembly.num_arms} arms")
@@ -80,7 +80,6 @@ def prepare(
         start,
         limits,
         np.array(scope * len(start) if len(scope) == 1 else scope),
-        None,
         task.security_margin,
         {},
     )
@@ -96,8 +95,7 @@ def prepare(
         goal = scenario.goal_configuration(assembly.joint_names)
     if task.check_reach:
         _check_reach(problem, isinstance(scenario, MoveitTask))
-    stage = problem.begin(0, start, problem.first_situation)
-    return _fitted(replace(problem, scene=problem.scene_of(stage)), goal)
+    return _fitted(problem, goal)
 
 
 def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
@@ -105,7 +103,8 @@ def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
 
     Where the bodies do not touch there; refuse a start that is infeasible all the same.
     """
-    if goal is None and _judged_start(problem).feasible[0]:
+    start = problem.start[:, None]
+    if goal is None and problem.first_stage.judge(start).feasible[0]:
         return problem
     ends = [problem.start] if goal is None else [problem.start, goal]
     free = [q for q in ends if _distances(problem, q).min(initial=np.inf) > 0.0]
@@ -113,36 +112,24 @@ def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
         table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
         bodies = problem.bodies.fitted(table, ignored, np.column_stack(free))
         problem = replace(problem, bodies=bodies, memory={})
-    judged = _judged_start(problem)
+    judged = problem.first_stage.judge(start)
     if not judged.feasible[0]:
         must = "within the hard limits of upright and keep_parallel"
         if judged.rows[COLLISION, 0] != 0.0:
-            distances, scene = _distances(problem, problem.start), problem.scene
-            assert scene is not None
-            one, two = scene.pair_names(int(np.argmin(distances)))
+            distances = _distances(problem, problem.start)
+            one, two = problem.scene.pair_names(int(np.argmin(distances)))
             depth = f"{max(-float(distances.min()), 0.0):.3g} {problem.task.length_unit}"
             must = f"free of collision ({one} and {two} overlap by {depth})"
         raise SettingError("scenario.q_start", must, list(problem.task.q_start))
     return problem
 
 
-def _judged_start(problem: Problem) -> Judged:
-    stage = problem.begin(0, problem.start, problem.first_situation)
-    return stage.judge(problem.start[:, None])
-
-
 def _distances(problem: Problem, q: FloatArray) -> FloatArray:
     """Return the distances of the exact bodies, pair by pair, at posture q (nq,)."""
     scene = problem.scene
-    assert scene is not None
     placements = scene.geometry.createData()
     pin.computeDistances(scene.model, scene.model.createData(), scene.geometry, placements, q)
     return np.array([result.min_distance for result in placements.distanceResults])
-
-
-@functools.lru_cache(maxsize=16)
-def _built(robot: Robot) -> Assembly:
-    return robot.build()
 
 
 @functools.lru_cache(maxsize=16)
@@ -150,7 +137,7 @@ def _bodies(
     robot: Robot, collision: CollisionModel, disabled: frozenset[frozenset[str]]
 ) -> BodyModel:
     """Return a robot's bodies; kept, since finding pairs that never touch takes longest."""
-    return collision.bind(_built(robot)._replace(disabled=disabled))
+    return collision.bind(robot.build()._replace(disabled=disabled))
 
 
 def _limits(assembly: Assembly) -> FloatArray:

@@ -6,10 +6,13 @@ are uniform within the joints' limits. A solution is flat: node by node, joint b
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import Field
 
+from evoexp.collision.bodies.covered_bodies import CoveredBodies
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
@@ -17,15 +20,16 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import UNLIMITED, ArmDefaults, ArmProblem, ArmTask, arm_problem
 from evoexp.planners.planner import JudgementArrays, Keeper, PlannerDefaults
-from evoexp.planners.proofs import Proofs
+from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.sampling_based.kernels import distance, lengths_along
-from evoexp.planners.sampling_based.settings import EdgeSettings, TreeGrowth
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
+from evoexp.validation import Component, Count, LayoutCount, NonNegativeCount, Positive, Settings
 
 MOST_STEPS = 10_000  # of a line through the whole space of configurations
 MOST_TESTED = 1_000_000  # configurations on such a line
+NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
 
 
 class TreePaths(PlannerDefaults):
@@ -92,8 +96,35 @@ class TreePaths(PlannerDefaults):
         return in_shape(solution, -1, len(problem.start))
 
 
-class NodePaths(TreePaths, ArmDefaults, EdgeSettings):
-    """The usual answers of a planner of paths in degrees, to be inherited before `Component`."""
+class NodePaths(TreePaths, ArmDefaults, Settings):
+    """The usual answers of a planner of paths in degrees, to be inherited before `Component`.
+
+    Distances are Euclidean over all joints of all arms, in degrees; a metre of a sliding joint
+    counts as a radian, 57.3 degrees.
+    """
+
+    range: Positive  # length of a step, the longest edge of a tree [deg]
+    num_shortcuts: NonNegativeCount  # attempts to shorten the path that was found; 0: none
+    free_turn: Positive  # how far joints without limits may go beyond start and goal [deg]
+    # the touching circles or spheres, or covers of the bodies. An edge as long as `range` is
+    # tested at `collision_substeps` configurations, other edges as densely
+    collision: TouchingSpheres | CoveredBodies
+    # which edges are free: those whose tested configurations are (`model`), or those of them
+    # that the exact certifier proves free of contact all along (`certified`), or free by the
+    # task's margins (`margin`). An edge that is refuted counts as colliding
+    acceptance: Acceptance = "model"
+    # how often all corners of the path are cut behind the shortcuts; 0: never
+    num_smoothings: Annotated[int, Field(ge=0, le=8)] = 0
+
+    @property
+    def resolution(self) -> float:
+        """Greatest distance between configurations that are tested on an edge [deg]."""
+        return self.range / self.collision.collision_substeps
+
+    @property
+    def num_improvements(self) -> int:
+        """Attempts to make a path better: shortcuts, then passes over all of its corners."""
+        return self.num_shortcuts + self.num_smoothings
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
         """Build the robot, and check that start and goal fit it and are free of collision."""
@@ -162,10 +193,25 @@ class NodePaths(TreePaths, ArmDefaults, EdgeSettings):
         return low <= -most, high >= most
 
 
-class InIterations(TreePaths):
-    """Counts the iterations of a search that goes on in batches of them, one per record."""
+class TreeGrowth(Component):
+    """How much is searched per record, and in all."""
 
-    ga: TreeGrowth
+    component: ClassVar[str] = "tree_growth"
+
+    # iterations between two records: random configurations that the trees grow toward, and,
+    # once there is a path, attempts to shorten it
+    iterations_per_generation: LayoutCount
+    num_generations: NonNegativeCount  # records after the first, at most
+
+
+class InIterations(TreePaths, Settings):
+    """Counts the iterations of a search that goes on in batches of them, one per record.
+
+    The planner has a `resolution` of its tests [deg] and a `box` of its draws, as `NodePaths`.
+    """
+
+    max_iterations: Count  # random configurations after which a search is given up
+    ga: TreeGrowth  # iterations per record, and records
 
     @property
     def most_iterations(self) -> int:
@@ -182,6 +228,14 @@ class InIterations(TreePaths):
         """Return the iterations of a generation, at most; a run may end within one."""
         size = self.ga.iterations_per_generation
         return max(0, min(size, self.most_iterations - index * size))
+
+    def memory(self, problem: Any) -> int:
+        """Return the memory of both trees, whose arrays double, and of an edge's tests."""
+        most = (self.num_generations + 1) * self.ga.iterations_per_generation
+        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)  # trees of one start
+        planner: Any = self
+        tested = distance(*planner.box(problem)) / planner.resolution
+        return int(8 * (len(problem.start) + 1) * (8 * nodes + 2 * tested))
 
 
 def judge_paths(edges: EdgeTest, paths: FloatArray) -> JudgementArrays:

@@ -9,7 +9,7 @@ shortcuts.
 
 import importlib.util
 from collections.abc import Callable, Iterator
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -20,11 +20,10 @@ from evoexp.planners.arm_tasks import ArmProblem, ArmTask
 from evoexp.planners.planner import Candidate, Reproducibility
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
-from evoexp.planners.sampling_based.settings import OmplSettings
 from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.validation import Component
+from evoexp.validation import Component, Count, NonNegativeCount
 
 SEEDS = 2**31
 BYTES_PER_QUERY = 500  # of a graph in OMPL, for the estimate of memory
@@ -33,12 +32,27 @@ ROADMAPS = ("PRMstar",)
 MOST_IDLE = 10_000  # iterations of OMPL without a query, after which it is done
 
 
-class OmplPlanner(NodePaths, OmplSettings, Component):
+class QueryChunks(Component):
+    """How long a planner of a library searches per record, and in all."""
+
+    component: ClassVar[str] = "query_chunks"
+
+    # configurations that are asked for between two records; an edge that is being tested is
+    # tested to its end
+    queries_per_generation: Count
+    num_generations: NonNegativeCount  # records after the first, at most
+
+
+class OmplPlanner(NodePaths, Component):
     """A planner of OMPL, by its name."""
 
     component: ClassVar[str] = "ompl"
     revision: ClassVar[int] = 3
     reproducibility: ClassVar[Reproducibility] = "environment"
+
+    # its name in OMPL; all of its settings but `range` are OMPL's own
+    algorithm: Literal["RRTConnect", "RRTstar", "InformedRRTstar", "BITstar", "AITstar", "PRMstar"]
+    ga: QueryChunks  # configurations asked for per record, and records
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
         """Build the robot, and check start, goal and settings."""
@@ -67,8 +81,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
 
     def memory(self, problem: ArmProblem) -> int:
         """Return an estimate by the number of configurations that are asked for."""
-        low, high = self.box(problem)
-        tested = distance(low, high) / self.resolution
+        tested = distance(*self.box(problem)) / self.resolution
         queries = (self.num_generations + 1) * self.ga.queries_per_generation
         return int(BYTES_PER_QUERY * queries + 16 * len(problem.start) * tested)
 
@@ -94,32 +107,29 @@ class _Search:
         return path_length(self.population)
 
     def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
-        """Go on by a chunk; return the length of the path in hand then [deg]."""
-        self._most += self._settings.ga.queries_per_generation
-        self._go_on(rng, self._most)
-        return np.array([self.best_cost])
-
-    def _go_on(self, rng: np.random.Generator, most: int) -> None:
-        """Search until so many configurations were asked for since the start, or to the end."""
+        """Go on by a chunk, or to the end; return the length of the path in hand then [deg]."""
+        settings = self._settings
+        self._most += settings.ga.queries_per_generation  # asked for since the start
         if self._path is None:
-            found = self._library.solve(most)
-            shorter = found is not None and path_length(found) < self.best_cost
-            if found is not None and shorter and self.edges.unproven(found) is None:
-                self.population, self._shown = found, found.flatten()
+            path = self._library.solve(self._most)
+            shorter = path is not None and path_length(path) < self.best_cost
+            if path is not None and shorter and self.edges.unproven(path) is None:
+                self.population, self._shown = path, path.flatten()
             if self._library.is_done:
                 self.stop_reason = "solution" if len(self.population) > 1 else "no solution"
-            if self._settings.algorithm not in DONE_WITH_A_PATH or len(self.population) == 1:
-                return
-            self._path = ShortenedPath(self.population, self.edges)
-        while self._path.num_attempts < self._settings.num_improvements:
-            if self.edges.queries >= most:
-                break
-            self._path.improve(self._settings, rng, 1)
-        else:
-            self.stop_reason = "solution"
-        self._path.settle()
-        if self._path.nodes is not self.population:
-            self.population, self._shown = self._path.nodes, self._path.nodes.flatten()
+            if settings.algorithm in DONE_WITH_A_PATH and len(self.population) > 1:
+                self._path = ShortenedPath(self.population, self.edges)
+        if self._path is not None:
+            left = settings.num_improvements - self._path.num_attempts
+            while left > 0 and self.edges.queries < self._most:
+                self._path.improve(settings.num_shortcuts, rng, 1)
+                left -= 1
+            if left <= 0:
+                self.stop_reason = "solution"
+            self._path.settle()
+            if self._path.nodes is not self.population:
+                self.population, self._shown = self._path.nodes, self._path.nodes.flatten()
+        return np.array([self.best_cost])
 
     def candidate(self) -> Candidate:
         """Return the path in hand as it is recorded; the same array as long as it is the same."""

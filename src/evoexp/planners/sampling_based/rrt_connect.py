@@ -13,33 +13,25 @@ import numpy as np
 
 from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.planner import Candidate
-from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import InIterations, NodePaths
-from evoexp.planners.sampling_based.settings import RrtSettings
 from evoexp.planners.sampling_based.trees import ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
-from evoexp.validation import Component
-
-NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
+from evoexp.validation import Component, NonNegativeCount
 
 
-class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
+class RrtConnect(InIterations, NodePaths, Component):
     """RRT-Connect and shortcuts."""
 
     component: ClassVar[str] = "rrt_connect"
     revision: ClassVar[int] = 3
 
+    # how often both trees are grown anew once a path is shortened or given up; the shortest
+    # path of all is the answer
+    num_restarts: NonNegativeCount = 0
+
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last path is shortened or given up."""
         return self.batches(_Search(self, problem), rng)
-
-    def memory(self, problem: ArmProblem) -> int:
-        """Return the memory of both trees, whose arrays double, and of a record's copy."""
-        most = (self.num_generations + 1) * self.ga.iterations_per_generation
-        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)  # trees of one start
-        low, high = self.box(problem)
-        tested = distance(low, high) / self.resolution
-        return int(8 * (len(problem.start) + 1) * (8 * nodes + 2 * tested))
 
     @property
     def most_iterations(self) -> int:
@@ -79,9 +71,19 @@ class _Search:
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)
             self._path, self._starts = None, self._starts + 1
         if self._path is not None:
-            return self._path.improve(self._planner, rng, most)
-        self._grow(rng)
-        return np.array([np.inf if self._path is None else self._path.length])
+            return self._path.improve(self._planner.num_shortcuts, rng, most)
+        drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
+        self._iterations += 1
+        nodes = self.pair.iterate(drawn)
+        if nodes is None:
+            return np.array([np.inf])
+        self._path = ShortenedPath(nodes, self.edges)
+        if not np.isfinite(self._first["first_solution_queries"]):
+            self._first = {
+                "first_solution_queries": float(self.edges.queries),
+                "first_solution_length_deg": self._path.length,
+            }
+        return self._path.lengths[-1:]
 
     def candidate(self) -> Candidate:
         """Return the shortest path as it is recorded, the same array as long as it is the same."""
@@ -96,27 +98,14 @@ class _Search:
 
     def _keep_shortest(self) -> None:
         """Keep the path in hand if it is the shortest so far, and proven where asked for."""
-        if self._path is not None and self._path.length < self.best_cost:
-            self._path.settle()
-        if self._path is not None and self._path.length < self.best_cost:
-            self.best_cost, self._solution = self._path.length, self._path.nodes.flatten()
+        path = self._path
+        if path is not None and path.length < self.best_cost:
+            path.settle()
+            if path.length < self.best_cost:
+                self.best_cost, self._solution = path.length, path.nodes.flatten()
 
     def _is_done(self) -> bool:
         """Whether the present start has come to its end."""
         if self._path is not None:
             return self._path.num_attempts >= self._planner.num_improvements
         return self.pair.num_iterations >= self._planner.max_iterations
-
-    def _grow(self, rng: np.random.Generator) -> None:
-        """Grow the trees; where they meet there is a path."""
-        drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
-        self._iterations += 1
-        nodes = self.pair.iterate(drawn)
-        if nodes is None:
-            return
-        self._path = ShortenedPath(nodes, self.edges)
-        if not np.isfinite(self._first["first_solution_queries"]):
-            self._first = {
-                "first_solution_queries": float(self.edges.queries),
-                "first_solution_length_deg": self._path.length,
-            }

@@ -14,38 +14,48 @@ from typing import ClassVar
 
 import numpy as np
 
+from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.answers import of_postures
 from evoexp.planners.planner import Candidate, JudgementArrays
-from evoexp.planners.proofs import Proofs
+from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.sampling_based.kernels import distance
-from evoexp.planners.sampling_based.node_paths import (
-    InIterations,
-    TreePaths,
-    judge_paths,
-    path_length,
-)
-from evoexp.planners.sampling_based.settings import ReachingSettings
+from evoexp.planners.sampling_based.node_paths import InIterations, judge_paths, path_length
 from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import bring_tip_to, tip
 from evoexp.scenarios.pick_and_place import PickAndPlace
-from evoexp.validation import Component
+from evoexp.validation import Component, Count, NonNegativeCount, Positive
 
 CLOSE = 1e-6  # [-] of the arm's length, by which the tip may miss a place
-NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
 PLACES = "via point", "goal point"
 
 
-class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
-    """RRT-Connect to postures that reach the via point, and then to some that reach the goal."""
+class RrtReaching(InIterations, Component):
+    """RRT-Connect to postures that reach the via point, and then to some that reach the goal.
+
+    Distances are Euclidean over all joints, in degrees.
+    """
 
     component: ClassVar[str] = "rrt_reaching"
     revision: ClassVar[int] = 2
     unit: ClassVar[float] = 1.0
+
+    range: Positive  # length of a step, the longest edge of a tree [deg]
+    # greatest distance between configurations that are tested on an edge [deg]
+    resolution: Positive
+    # free postures drawn for a place of the tip, of which the nearest one is taken
+    num_postures: Count
+    num_shortcuts: NonNegativeCount  # attempts to shorten the path to a posture; 0: none
+    # how often all is begun anew; the shortest path of all is the answer
+    num_restarts: NonNegativeCount
+    collision: LinkEllipses  # links as lines among ellipses, tested at single configurations
+    # which plans are an answer: those whose tested configurations are free, or those of them
+    # that the exact certifier proves
+    acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
         """Build the robot and check that the start fits it and is free of collision."""
@@ -86,12 +96,9 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
                 found.append(f"the tip misses the {place} by {error:.3g}")
         return found
 
-    def memory(self, problem: Problem) -> int:
-        """Return the memory of both trees, whose arrays double, and of an edge's tests."""
-        low, high = problem.joint_limits.T / DEGREE
-        tested = distance(low, high) / self.resolution
-        nodes = NODES_PER_ITERATION * self.max_iterations
-        return int(8 * (len(problem.start) + 1) * (8 * nodes + 2 * tested))
+    def box(self, problem: Problem) -> FloatArray:
+        """Return the least and the greatest value of each joint, (2, nq) [deg]."""
+        return np.asarray(problem.joint_limits.T / DEGREE)
 
     def _errors(self, problem: Problem, path: FloatArray) -> tuple[float, float]:
         """Return the least distance of the tip from the via point, and its last from the goal."""
@@ -152,7 +159,7 @@ class _Search:
         goal = yield from self._posture(rng, nodes[-1], target)
         if goal is None:
             return None
-        low, high = self._problem.joint_limits.T / DEGREE
+        low, high = planner.box(self._problem)
         trees = TreePair(nodes[-1], goal, self.edges, planner.range)
         for _ in range(planner.max_iterations):
             self._iterations += 1

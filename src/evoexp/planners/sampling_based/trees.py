@@ -20,7 +20,6 @@ from evoexp.planners.sampling_based.kernels import (
     shortcuts,
     tested_configurations,
 )
-from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.records import FloatArray
 
 CUT = 0.25  # [-] of a segment, from a corner to where it is cut
@@ -178,12 +177,12 @@ class ShortenedPath:
             self.nodes = self._before.pop()
         self._before, self.lengths = [], lengths_along(self.nodes)
 
-    def improve(self, settings: EdgeSettings, rng: np.random.Generator, most: int) -> FloatArray:
+    def improve(self, num_shortcuts: int, rng: np.random.Generator, most: int) -> FloatArray:
         """Try some shortcuts, `most` at most, or cut the corners where all were tried.
 
         Returns the length of the path after each attempt [deg].
         """
-        left = settings.num_shortcuts - self.num_attempts
+        left = num_shortcuts - self.num_attempts
         if left > 0:
             return self.attempt(rng.random((min(left, most), 2)))
         self.cut_corners()

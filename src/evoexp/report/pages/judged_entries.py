@@ -18,7 +18,7 @@ from evoexp.report.statistics.judging import Hearing, Judge
 HIGHER = "higher"  # values of an entry are better so; lower if it does not say
 
 
-def judged(scope: Scope, entry: Mapping[str, Any]) -> Iterator[Claim]:
+def judged_as_written(scope: Scope, entry: Mapping[str, Any]) -> Iterator[Claim]:
     """Judge a claim by the kind of its rule; nothing where a condition that it needs was left out.
 
     The entry names the rule (`claim`), the condition by its label (`of`; that of the item if it
@@ -28,14 +28,16 @@ def judged(scope: Scope, entry: Mapping[str, Any]) -> Iterator[Claim]:
     """
     judge: Judge = scope["judge"]
     by_label = {c.label: c for c in scope["conditions"]}
-    labels = [scope.text(label) for label in [entry.get("of", "{condition.label}"), *_beside(entry)]]
+    than = entry.get("than", [])
+    beside = [than] if isinstance(than, str) else than
+    labels = [scope.text(label) for label in (entry.get("of", "{condition.label}"), *beside)]
     own, *others = map(by_label.get, labels)
     if own is None or None in others:
         return
     words = {name: scope.text(text) for name, text in entry.get("words", {}).items()}
-    hearing = judge.on(entry["claim"], **{"who": labels[0], "others": _listed(labels[1:])} | words)
-    beside = [other for other in others if other is not None]
-    yield _claim(judge, hearing, scope.function(entry["values"]), own, beside, entry)
+    hearing = judge.on(entry["claim"], who=labels[0], others=", ".join(labels[1:]), **words)
+    known = [other for other in others if other is not None]
+    yield _claim(judge, hearing, scope.function(entry["values"]), own, known, entry)
 
 
 def _claim(
@@ -75,15 +77,6 @@ def _claim(
             return hearing.every(judge.share(share), share.having, share.total, own.planned)
         case _:
             return hearing.majority(judge.share(share := _share(values(own))), *share)
-
-
-def _beside(entry: Mapping[str, Any]) -> list[str]:
-    labels = entry.get("than", [])
-    return [labels] if isinstance(labels, str) else labels
-
-
-def _listed(labels: Sequence[str]) -> str:
-    return ", ".join(labels)
 
 
 def _share(holds: Any) -> Proportion:

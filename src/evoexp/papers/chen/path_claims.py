@@ -215,6 +215,10 @@ def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
         complete = 0 < main.planned <= main.done
         holds = False if runs.having < main.done else True if complete else None
         yield hearing.own({"runs": runs}, main.done, holds)
+    if len(groups) == 3 and all(group.truth is not None for group in groups):
+        paths = {tuple(map(tuple, group.best_path[0].tolist())) for group in groups}
+        told = f"{len(paths)} different best paths known of {len(groups)} weightings"
+        yield judge.on("different_paths").own(told, len(groups), len(paths) == len(groups))
     for group in groups:
         if group.truth is not None:
             yield nearly_best(judge, group.main, group.optimum, group.bound)
@@ -223,6 +227,14 @@ def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
         for own in group.conditions if controls else ():
             if not own.is_control:
                 yield evolution(judge, own, controls)
+
+
+def falls_steadily(condition: ConditionResults) -> np.ndarray:
+    """Return whether each run's average cost falls from every fifth of it to the next, (done,)."""
+    rows = condition.generations
+    fifth = (5 * rows["index"]) // (rows.groupby("replicate")["index"].transform("max") + 1)
+    means = rows.groupby(["replicate", fifth])["mean_cost"].mean().unstack()
+    return np.asarray((means.diff(axis=1).iloc[:, 1:] < 0.0).all(axis=1))
 
 
 def excess(condition: ConditionResults, shortest_known: float) -> FloatArray:

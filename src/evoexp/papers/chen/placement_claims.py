@@ -14,6 +14,15 @@ from evoexp.report.statistics.comparisons import by_column, compared
 from evoexp.report.statistics.inference import Interval, Proportion, fisher_exact
 from evoexp.report.statistics.judging import Judge
 
+MANIPULABILITY = "manipulability and torque"
+SECONDS = {  # criteria that took two seconds: beside what, and where the paper says so
+    "minimax torque": (
+        " (the subgradient algorithm of Pin & Culioli: 15 minutes)",
+        "section 4.2 A",
+    ),
+    MANIPULABILITY: ("", "section 4.2 C"),
+}
+
 
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge the number, the angles, the torques and their ratio, as far as they are printed."""
@@ -113,9 +122,12 @@ def judge_cases(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
     for case in exact_cases:
         yield from _against_conventional(judge, case)
     for case in exact_cases:
-        if case.name == "minimax torque" and case.plain is not None:
+        if case.name == MANIPULABILITY:
+            yield judge.on("many_optima", case=case.name).at_least(float(len(case.minima)))
+        if case.name in SECONDS and case.plain is not None:
             seconds = float(np.median(case.plain.column("cpu_s")))
-            hearing = judge.on("seconds", case=case.name)
+            beside, where = SECONDS[case.name]
+            hearing = judge.on("seconds", case=case.name, beside=beside, where=where)
             told, holds = {"milliseconds": 1e3 * seconds}, seconds <= hearing.rule.limits["most_s"]
             yield hearing.own(told, case.plain.done, holds)
 

@@ -20,6 +20,7 @@ from evoexp.report.statistics.judging import Judge, fisher_evidence
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 RECOMMENDED = 100.0  # individuals (section 5)
+REASONABLE = {RECOMMENDED: ("reasonable", "section 5"), 50.0: ("typical", "section 4.2")}
 # what else a smaller population changes
 KEPT, SCALED = "all else equal", "parents in proportion, patience in evaluations"
 # (task, size, its condition, that of the recommended size)
@@ -178,7 +179,11 @@ def judge_study(
         _over_proportional(judge, "evaluations", SCALED, rows),
         _converges_less(judge, KEPT, kept),
         _converges_less(judge, SCALED, scaled),
-        *(_reasonable(judge, metric, sizes, values) for metric, values in METRICS.items()),
+        *(
+            _reasonable(judge, size, metric, sizes, values)
+            for size in REASONABLE
+            for metric, values in METRICS.items()
+        ),
     )
 
 
@@ -301,8 +306,8 @@ def _converges_less(judge: Judge, how: str, sizes: list[SizePair]) -> Claim:
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 
-def _reasonable(judge: Judge, metric: str, found: Tasks, values: Values) -> Claim:
-    """Judge that 100 is a reasonable size on every task that can be solved."""
+def _reasonable(judge: Judge, size: float, metric: str, found: Tasks, values: Values) -> Claim:
+    """Judge that a size is a reasonable one on every task that can be solved."""
     factors = {}
     for task in found:
         efforts = {
@@ -310,11 +315,12 @@ def _reasonable(judge: Judge, metric: str, found: Tasks, values: Values) -> Clai
             for v, c in task.by_value.items()
         }
         best = min(efforts, key=lambda value: efforts[value])
-        if RECOMMENDED in efforts and np.isfinite(efforts[best]):
-            factors[task.name] = efforts[RECOMMENDED] / efforts[best], best
+        if size in efforts and np.isfinite(efforts[best]):
+            factors[task.name] = efforts[size] / efforts[best], best
     texts = (f"{name} {_short(factor)} (best: {b:g})" for name, (factor, b) in factors.items())
     most = judge.rules["reasonable"].limits["most"]
-    told = f"effort of 100 over that of the best size: {', '.join(texts) or '–'}"
-    hearing = judge.on("reasonable", metric=metric)
+    told = f"effort of {size:g} over that of the best size: {', '.join(texts) or '–'}"
+    word, where = REASONABLE[size]
+    hearing = judge.on("reasonable", size=f"{size:g}", word=word, where=where, metric=metric)
     against = any(factor > most for factor, _ in factors.values())
     return hearing.own(told, f"{len(factors)} tasks", _unless(against, factors))

@@ -1,8 +1,9 @@
 """The claims of Curkovic et al. 2013 on methods and motions, and under assumed numbers."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -290,3 +291,9 @@ def _whole_motion_free(
     free, judged = run_measures.certified(c).having, c.done - c.verdicts.undecided
     hearing = judge.on(name, judge="the exact verdict on the whole motion", **words)
     return hearing.majority(f"{markdown.share(free, judged)} runs", free, judged)
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "pairs": lambda: PAIRS,
+    "has_hall": lambda condition: condition.label in TWINS,
+}

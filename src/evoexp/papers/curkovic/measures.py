@@ -4,17 +4,21 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import BoolArray, FloatArray
 from evoexp.report.pages.page_parts import PlayedRun
+from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import counted, search_seconds, solved, summed, touches
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
+from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.inference import Proportion, quantile
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
+EARLY = 30  # generation that the paper's Fig. 5 calls an early phase
 INSTANTS = 100  # of a segment, at which the paper's model looks for contacts of whole motions
 CERTIFIED = "best cost, a refuted motion counting as worse than any"
 
@@ -105,6 +109,54 @@ def exemplar(condition: ConditionResults) -> int:
     return int(condition.summaries.index[int(np.argmin(costs))])
 
 
+def near_best(condition: ConditionResults, results: Results, rules: Rules) -> BoolArray:
+    """Return whether each run's cost is near the best one known of its scene, (done,).
+
+    The best one of all runs of the experiment: nobody knows the optimum.
+    """
+    scene = condition.robot, condition.scenario
+    beside = [c for c in results.with_data if (c.robot, c.scenario) == scene]
+    known = min(float(c.column("best_cost").min()) for c in beside)
+    most = 1.0 + 0.01 * rules["near_optimal"].limits["near_percent"]
+    return np.asarray(condition.column("best_cost") <= most * known)
+
+
+def early_cost(condition: ConditionResults) -> FloatArray:
+    """Return the cost of each run's best team at generation 30, (done,); inf: it has none."""
+    rows = condition.generations
+    costs = rows[rows["index"] <= EARLY].groupby("replicate")["best_cost"].min()
+    return _of_runs(condition, costs)
+
+
+def cost_at_equal_effort(condition: ConditionResults, results: Results) -> FloatArray:
+    """Return the cost of each run's best team after as many evaluations as the shortest run has.
+
+    Shape (done,); inf where it has no team by then.
+    """
+    budget = min(float(c.column("evaluations").min()) for c in results.with_data)
+    rows = condition.generations
+    costs = rows[rows["evaluations"] <= budget].groupby("replicate")["best_cost"].min()
+    return _of_runs(condition, costs)
+
+
+def cost_spread(condition: ConditionResults) -> FloatArray:
+    """Return how far each run's best cost is from the median of all, (done,): Brown & Forsythe."""
+    costs = condition.column("best_cost")
+    return np.asarray(np.abs(costs - np.median(costs)))
+
+
+def elbow_changes(condition: ConditionResults) -> FloatArray:
+    """Return how often elbows change sides from a configuration to the next, (done,).
+
+    Summed over the robots: the angle of the second link against the first changes its sign.
+    """
+    changes = []
+    for solution in condition.solutions.values():
+        elbows = motion_geometry.configurations(condition.prepared, solution)[1::2]
+        changes.append(float(np.count_nonzero(np.diff(np.sign(elbows), axis=1))))
+    return np.array(changes)
+
+
 class Defects(NamedTuple):
     """Counts of the solved motions that have each of the known defects."""
 
@@ -131,10 +183,17 @@ def times_over_limit(condition: ConditionResults) -> FloatArray:
 def _first(condition: ConditionResults, threshold: float, column: str) -> FloatArray:
     rows = condition.generations
     first = rows[rows["best_cost"] <= threshold].groupby("replicate")[column].min()
-    return first.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
+    return _of_runs(condition, first)
+
+
+def _of_runs(condition: ConditionResults, values: pd.Series) -> FloatArray:
+    """Return values by replicate as (done,), infinite where a run has none."""
+    return values.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "too_fast": lambda condition: times_over_limit(condition) > 1.0,  # by Eq. 2, (done,)
+    "touching": lambda condition: touches(condition)[solved(condition)],  # of the solved motions
     # expected running time to a cost in whole evaluations, (1,)
     "expected_effort": lambda condition, threshold: np.rint(
         [expected_evaluations(condition, threshold)]

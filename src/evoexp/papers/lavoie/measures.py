@@ -8,7 +8,7 @@ import numpy as np
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
 from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Family, by_column
@@ -109,6 +109,11 @@ def refuted(condition: ConditionResults) -> RefutedMotions:
 
 
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
+
+
+def untouched(condition: ConditionResults) -> BoolArray:
+    """Return whether each accepted motion touches nothing, (solved,)."""
+    return ~run_measures.touches(condition)[run_measures.solved(condition)]
 
 
 def told_shares(condition: ConditionResults, confidence: float) -> str:

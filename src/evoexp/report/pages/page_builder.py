@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, cast
 
 from evoexp.report.pages import GENERIC, page_registration, swept
+from evoexp.report.pages.judged_entries import judged_as_written
 from evoexp.report.pages.motion_pictures import best_motions
 from evoexp.report.pages.page_file import PageFile, own_pages, read_page_file
 from evoexp.report.pages.page_parts import (
@@ -122,7 +123,9 @@ class PageBuilder:
         for entry in entries:
             each: Entry = {"judge": [entry]} if isinstance(entry, str) else entry
             for scope in self.items(each):
-                for name in each["judge"]:
+                if "claim" in each:
+                    yield from judged_as_written(scope, each)
+                for name in each.get("judge", ()):
                     judged = scope[name]
                     yield from [judged] if isinstance(judged, Claim) else judged or ()
 

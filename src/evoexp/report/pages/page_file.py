@@ -26,7 +26,7 @@ KEYS: dict[str, set[str]] = {
     "file": {"name", "functions", "pages", "quantities", "tables", "checks", "figures"},
     "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
     | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
-    "claims": {"each", "when", "judge"},
+    "claims": {"each", "when", "judge", "claim", "of", "than", "values", "better", "word", "words"},
     "comparisons": {"families", "measures", "controls"},
     "headlines": {"claim", "quantity", "values", "judge"},
     "tables": {"heading", "headers", "behind", "each", "when", "cells", "row", "rows"} | {"note"},

@@ -46,6 +46,18 @@ class Hearing(NamedTuple):
         most, size = holds > done / 2, self._share("share of runs", holds, done, 0.5)
         return self._claim("majority", evidence, done, most, bool(done) and not most, size)
 
+    def above(self, share: Proportion, level: float) -> Claim:
+        """Judge a claim that something holds in more than some percent."""
+        interval, least = share.interval(level), 0.01 * self.rule.limits["percent"]
+        size = self._share("share", *share, least)
+        holds, fails = interval.low > least, interval.high < least
+        return self._claim("above", share.with_interval(level), share.total, holds, fails, size)
+
+    def at_least(self, number: float) -> Claim:
+        """Judge a claim about a number that needs no runs."""
+        holds = number >= self.rule.limits["number"]
+        return self._claim("at least", markdown.number(number), "–", holds, not holds, None)
+
     def better(self, row: Comparison | None, word: str, told: str = "{}") -> Claim:
         """Judge a claim that the first condition of a comparison is better than the second.
 

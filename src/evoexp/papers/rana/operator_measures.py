@@ -1,0 +1,77 @@
+"""What the paper says its operators do to strings, measured on strings that nothing selected."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from evoexp.papers.rana import motions
+from evoexp.records import FloatArray
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.run_measures import counted
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.inference import Proportion
+
+FRESH = 1000  # strings
+UNEVEN, EVEN = 2.0, 1.05  # ratios of the longest step of a path to its shortest one (ours)
+
+
+def fresh(condition: ConditionResults, *, redistributed: bool) -> FloatArray:
+    """Return new random walks (section 3.3), not relaxed, (nq, N + 1, `FRESH`) [deg]."""
+    settings = {"redistribution": redistributed, "relaxation_step": 0.0}
+    planner = condition.planner.model_copy(update=settings)
+    rng = np.random.Generator(np.random.PCG64(0))
+    return np.asarray(planner.sample(motions.problem(condition), rng, FRESH))
+
+
+def steps(condition: ConditionResults, q: FloatArray) -> list[FloatArray]:
+    """Return the lengths of each arm's steps between via-points of q, (nq, N + 1, …) [deg]."""
+    arms = motions.problem(condition).arm_slices
+    return [np.linalg.norm(np.diff(q[first:stop], axis=1), axis=0) for first, stop in arms]
+
+
+def _unequal(condition: ConditionResults, strings: FloatArray, ratio: float) -> np.ndarray:
+    """Return whether the steps of a path differ by more than a ratio, (arms, strings)."""
+    return np.array([s.max(axis=0) > ratio * s.min(axis=0) for s in steps(condition, strings)])
+
+
+def shortened(condition: ConditionResults) -> Proportion:
+    """Count the fresh strings, redistributed, that one relaxation makes shorter."""
+    strings = fresh(condition, redistributed=True)
+    relaxing = condition.planner.model_copy(update={"redistribution": False})
+    rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
+    relaxed = relaxing.improve(motions.problem(condition), strings, rng)
+    before, after = (sum(s.sum(axis=0) for s in steps(condition, q)) for q in (strings, relaxed))
+    return counted(np.less(after, before))
+
+
+def speed_variation(condition: ConditionResults) -> FloatArray:
+    """Return how much joint speed varies along each run's best motion, (done,) [-].
+
+    Standard deviation over mean of an arm's speed from via-point to via-point, which it passes in
+    equal times; the mean of all arms.
+    """
+    found = []
+    for solution in condition.solutions.values():
+        speeds = steps(condition, motion_geometry.configurations(condition.prepared, solution))
+        found.append(np.mean([speed.std() / speed.mean() for speed in speeds]))
+    return np.array(found)
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # k1 / k2: how many times the weight of unevenness that of the length is
+    "length_over_unevenness": lambda condition: (
+        condition.planner.objective.length_weight / condition.planner.objective.unevenness_weight
+    ),
+    # paths of fresh walks whose steps are uneven, and of redistributed ones whose steps are even
+    "uneven_walks": lambda condition: counted(
+        _unequal(condition, fresh(condition, redistributed=False), UNEVEN).ravel()
+    ),
+    "even_paths": lambda condition: counted(
+        ~_unequal(condition, fresh(condition, redistributed=True), EVEN).ravel()
+    ),
+    # motions whose bodies never come closer than the safety distance, exactly
+    "with_margin": lambda condition: Proportion(
+        condition.verdicts.with_margin, condition.verdicts.judged
+    ),
+}

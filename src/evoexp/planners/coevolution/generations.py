@@ -161,8 +161,9 @@ class TeamSearch(TableSearch):
         """Breed the generation behind one, or begin anew; return how many numbers that took."""
         self._waiting, ga = 0 if self.keeper.best.solved else self._waiting + 1, self._planner.ga
         if ga.restart_after is None or self._waiting < ga.restart_after:
-            rules = ga.mutation_rate_at(index + 1), self._heredity, self._table, self._num_teams
-            return int(follow(*self._operators, uniforms, index, *rules))
+            rate, (select, cross, mutate) = ga.mutation_rate_at(index + 1), self._operators
+            rules = self._heredity, self._table, self._num_teams
+            return int(follow(select, cross, mutate, uniforms, index, rate, *rules))
         # "If no convergence has occurred, …, the algorithm generates new populations" (section 3)
         populations = self._table.populations[(index + 1) % self.num_places]
         own = uniforms[: populations.size].reshape(populations.shape)

@@ -12,7 +12,6 @@ import pytest
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.via_point_ga.strings import PER_CALL
 from evoexp.records import generations
 from evoexp.testing import conditions
@@ -40,11 +39,11 @@ def bench_redistribution_and_relaxation(beside: Any) -> None:
     arms = np.array([[0, 2], [2, 4]])
     fresh = np.zeros((4, 21, 56))
     fresh[:, :, :50] = strings.transpose(1, 3, 2, 0).reshape(4, 21, 50)
-    via_points, workspace = fresh.copy(), prepare_redistribution(20, 2)
+    via_points = fresh.copy()
 
     def ours() -> None:
         np.copyto(via_points, fresh)
-        redistribute(via_points, arms, 50, workspace)
+        redistribute(via_points, arms, 50)
         relax(via_points, 0.5, 50)
 
     ours()

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from evoexp.numeric.generator_state import state_bytes, states_behind
 from evoexp.numeric.random_stream import (
     Block,
-    DrawnAhead,
     Draws,
     draw,
     draw_index,
@@ -54,26 +53,6 @@ def test_indices_stay_below_their_count() -> None:
     almost = np.nextafter(1.0, 0.0)
     block = Block(np.array([0.0, 0.5, almost, almost]), np.zeros(1, dtype=np.int64))
     assert [draw_index(block, count) for count in (3, 3, 3, 2**53)] == [0, 1, 2, 2**53 - 1]
-
-
-@given(
-    st.integers(0, 6).flatmap(
-        lambda most: st.tuples(
-            st.just(most),
-            st.lists(st.lists(st.integers(0, most), min_size=1, max_size=4), max_size=6),
-        )
-    )
-)
-def test_steps_take_numbers_that_are_drawn_ahead(wanted: tuple[int, list[list[int]]]) -> None:
-    most, blocks = wanted
-    ahead, step_by_step = DrawnAhead(rng(), most), rng()
-    for counts in blocks:
-        numbers, begin = ahead.draw(len(counts)), 0
-        assert len(numbers) >= most * len(counts)
-        for count, state in zip(counts, ahead.take(counts), strict=True):
-            assert np.array_equal(numbers[begin : begin + count], step_by_step.random(count))
-            assert state == state_bytes(step_by_step.bit_generator)
-            begin += count
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 1000])

@@ -11,15 +11,7 @@ from numba.core.errors import TypingError
 from evoexp.numeric.compilation import copy_part, kernel
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
-from evoexp.numeric.vector_rows import (
-    lane_numbers,
-    load_each,
-    load_pairs,
-    load_quads,
-    num_up_to,
-    store_places,
-    transposed,
-)
+from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
     any_lane,
@@ -192,21 +184,6 @@ def test_sines_and_cosines_of_turns_are_right() -> None:
 # Rows and columns, and parts of arrays
 
 
-@kernel
-def each(array: FloatArray, places: Any, at: int, offset: int) -> Any:
-    return (load_each(array, places, U(at), U(offset)),)
-
-
-@kernel
-def pairs(array: FloatArray, places: Any, at: int, offset: int) -> Any:
-    return load_pairs(array, places, U(at), U(offset))
-
-
-@kernel
-def quads(array: FloatArray, places: Any, at: int, offset: int) -> Any:
-    return load_quads(array, places, U(at), U(offset))
-
-
 def test_a_square_is_transposed() -> None:
     @kernel
     def transpose(square: FloatArray, out: FloatArray) -> None:
@@ -219,50 +196,6 @@ def test_a_square_is_transposed() -> None:
     square, out = np.random.default_rng(0).random((LANES, LANES)), np.empty(LANES * LANES)
     transpose(square.ravel(), out)
     assert np.array_equal(out.reshape(LANES, LANES), square.T)
-
-
-@pytest.mark.parametrize(("read", "width"), [(each, 1), (pairs, 2), (quads, 4)])
-def test_columns_are_read_from_each_lanes_own_place(read: Any, width: int) -> None:
-    @kernel
-    def fill(array: FloatArray, places: Any, at: int, offset: int, out: FloatArray) -> None:
-        columns = read(array, places, at, offset)
-        for k in range(len(columns)):
-            store(out, U(8 * k), columns[k])
-
-    rng = np.random.default_rng(1)
-    array = rng.random(100)
-    for at, offset in ((0, 0), (5, 17)):
-        places, out = rng.integers(0, 70, 20).astype(np.uint64), np.empty(width * LANES)
-        fill(array, places, at, offset, out)
-        begins = places[at : at + LANES].astype(int) + offset
-        assert np.array_equal(out.reshape(width, LANES).T, [array[b : b + width] for b in begins])
-
-
-def test_numbers_up_to_a_limit_are_counted() -> None:
-    @kernel
-    def count(array: FloatArray, places: Any, limits: FloatArray, out: FloatArray) -> None:
-        store(out, U(0), num_up_to(array, places, U(0), U(10), load(limits, U(0))))
-
-    rng = np.random.default_rng(2)
-    for k in range(200):
-        array = rng.integers(0, 5, 60).astype(float)
-        array[rng.integers(0, 60, 3)] = [np.nan, np.inf, -np.inf]
-        limits = rng.integers(-1, 6, LANES).astype(float)
-        limits[k % LANES] = (np.nan, np.inf)[k % 2]
-        places, out = rng.integers(0, 40, LANES).astype(np.uint64), np.empty(LANES)
-        count(array, places, limits, out)
-        for lane, begin in enumerate(places.astype(int) + 10):
-            assert out[lane] == np.count_nonzero(array[begin + 1 : begin + 8] <= limits[lane])
-
-
-def test_whole_numbers_become_places() -> None:
-    @kernel
-    def as_places(numbers: FloatArray, out: Any) -> None:
-        store_places(out, U(3), load(numbers, U(0)) + lane_numbers())
-
-    numbers, out = np.array([0.0, 1.0, 5.0, 2.0**40, 7.0, 0.0, 3.0, 2.0]), np.zeros(12, np.uint64)
-    as_places(numbers, out)
-    assert list(out) == [0, 0, 0, *(numbers + np.arange(8)).astype(int), 0]
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.int32, np.int64, np.float64])

@@ -4,7 +4,6 @@ import numpy as np
 
 from evoexp.paths.lengths import relax_points
 from evoexp.paths.redistribution import redistribute_arms
-from evoexp.paths.workspace import Redistribution
 
 
 def padded(num_lanes: int) -> int:
@@ -12,10 +11,14 @@ def padded(num_lanes: int) -> int:
 
 
 def redistribute(
-    via_points: np.ndarray, arm_slices: np.ndarray, num_lanes: int, workspace: Redistribution
+    via_points: np.ndarray,
+    arm_slices: np.ndarray,
+    num_lanes: int,
+    end: str = "natural",
+    samples: int = 8,
 ) -> None:
     if via_points.shape[1] > 2:
-        redistribute_arms(via_points, arm_slices, padded(num_lanes), workspace)
+        redistribute_arms(via_points, arm_slices, padded(num_lanes), samples, end == "clamped")
 
 
 def relax(via_points: np.ndarray, delta: float, num_lanes: int) -> None:

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
-from evoexp.paths.workspace import prepare_redistribution
 from evoexp.records import FloatArray
 from paths.string_operators import redistribute, relax
 
@@ -44,10 +43,8 @@ def moved(
     given: FloatArray, arms: Any, lanes: int, end: Any = "natural", samples: int = 8
 ) -> FloatArray:
     """Return the strings of the first lanes redistributed, arm by arm."""
-    out, slices = given.copy(), np.array(arms, dtype=np.int64)
-    joints = int(np.diff(slices).max())
-    workspace = prepare_redistribution(given.shape[1] - 1, joints, end, samples)
-    redistribute(out, slices, lanes, workspace)
+    out = given.copy()
+    redistribute(out, np.array(arms, dtype=np.int64), lanes, end, samples)
     return out
 
 

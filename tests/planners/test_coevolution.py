@@ -10,7 +10,6 @@ from composed import composed
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
-from evoexp.planners.coevolution.generations import CACHED, PER_CALL, per_call
 from evoexp.planners.coevolution.planner import Coevolution, Problem
 from evoexp.records import generations
 from evoexp.report.results.stored_results import ConditionResults
@@ -152,14 +151,6 @@ def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
     scene = safety.prepare().problem.scene
     assert set(scene.names) == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}
     assert [shape.radius for shape, _, _ in scene.shapes] == [0.02, 0.02, 0.04] * 2
-
-
-def test_large_populations_are_computed_generation_by_generation() -> None:
-    assert per_call(2, 100) == PER_CALL
-    assert per_call(2, 5000) == 1
-    for count in (1, 10, 150, 200, 1000):
-        length = per_call(2, count)
-        assert length == 1 or 2 * length * count * count <= CACHED
 
 
 def worsens(given: Condition, seed: Any) -> bool:

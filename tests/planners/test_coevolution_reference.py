@@ -13,7 +13,6 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.planners.coevolution import generations as team_generations
 from evoexp.records import generations
 from references import curkovic_numpy
 
@@ -105,14 +104,6 @@ def test_variants_agree(changes: dict[str, Any]) -> None:
         events = compare(condition(SMALL | changes), seed)
         assert events["collisions"] > 0
         assert (events["contacts"] > 0) is ("scenario.obstacles" in changes)
-
-
-@pytest.mark.parametrize("length", [1, 3, 100])
-def test_the_number_of_generations_per_call_changes_nothing(
-    length: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(team_generations, "per_call", lambda robots, count: length)
-    compare(condition(SMALL), 2)
 
 
 @pytest.mark.examples(2)

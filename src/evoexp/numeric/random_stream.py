@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
-from evoexp.numeric.generator_state import state_bytes, states_behind
 
 
 class Block(NamedTuple):
@@ -39,30 +38,6 @@ class Draws:
         rng.random(out=self._memory[len(left) : count])
         self.block = Block(self._memory[:count], self.block.taken)
         self.block.taken[0] = 0
-
-
-class DrawnAhead:
-    """Uniform numbers for several steps at once; what they leave is for the next steps."""
-
-    def __init__(self, rng: np.random.Generator, most: int) -> None:
-        """Begin where a PCG64 is; a step takes `most` numbers, as far as the caller knows."""
-        self._rng, self._most, self._left = rng, most, np.empty(0)
-        self._state = state_bytes(rng.bit_generator)
-
-    def draw(self, steps: int) -> NDArray[np.float64]:
-        """Return at least as many numbers, uniform in [0, 1), as the next steps may take."""
-        missing = steps * self._most - len(self._left)
-        if missing > 0:
-            fresh = self._rng.random(missing)
-            self._left = np.concatenate([self._left, fresh]) if len(self._left) else fresh
-        return self._left
-
-    def take(self, counts: list[int]) -> list[bytes]:
-        """Tell how many numbers each step took; return the states that lie behind each of them."""
-        self._left = self._left[sum(counts) :]
-        states = states_behind(self._state, counts)
-        self._state = states[-1]
-        return states
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE, asin, sincos
 from evoexp.records import BoolArray, FloatArray
 
@@ -83,7 +83,7 @@ class Model(NamedTuple):
         return (0 if within[0, 0] else -1), one[:, 0], two[:, 0]
 
 
-@kernel
+@inlined
 def _inverse(value: float, cap: float) -> float:
     """Return 1 / value, at most `cap`; rounding may make a singular posture's value negative."""
     return 1.0 / value if value * cap > 1.0 else cap
@@ -96,20 +96,14 @@ def measure_branches(angles: FloatArray, count: int, model: Model) -> tuple[Floa
     Returns by branch (2, RESULTS, count): the criteria, torques, θ3 [deg] and X_p, which are NaN
     out of reach; and (2, count) whether each is feasible: reachable, and within the limits.
     """
-    task, links = model.task, np.empty((7, count))
-    for k in range(count):
-        s1, c1 = sincos(DEGREE * angles[0, k])
-        s12, c12 = sincos(DEGREE * (angles[0, k] + angles[1, k]))
-        s123 = (task.y_e - task.l1 * s1 - task.l2 * s12) / task.l3
-        c123, absolute = np.nan, np.nan
-        if abs(s123) <= 1.0:
-            c123 = np.sqrt((1.0 - s123) * (1.0 + s123))
-            absolute = asin(s123) / DEGREE
-        links[0, k], links[1, k], links[2, k], links[3, k] = s1, c1, s12, c12
-        links[4, k], links[5, k], links[6, k] = s123, c123, absolute
+    angles, model = borrowed((angles, model))
     branches, within = np.empty((2, RESULTS, count)), np.empty((2, count), dtype=np.bool_)
+    numbers = np.empty(RESULTS)
     for branch in range(2):
-        _measure_branch(angles, count, links, branch, model, branches[branch], within[branch])
+        for k in range(count):
+            within[branch, k] = _measure(angles[0, k], angles[1, k], branch, model, numbers)
+            for row in range(RESULTS):
+                branches[branch, row, k] = numbers[row]
     return branches, within
 
 
@@ -129,89 +123,60 @@ def measure_postures(angles: FloatArray, count: int, model: Model, out: FloatArr
         out[CRITERIA, k] = 1.0 if other else (0.0 if one else -1.0)
 
 
-@kernel
-def _measure_branch(
-    angles: FloatArray,
-    count: int,
-    links: FloatArray,
-    branch: int,
-    model: Model,
-    out: FloatArray,
-    within: BoolArray,
-) -> None:
-    """Measure one value of θ3 of every posture, without a branch in the loop.
+@inlined
+def _measure(theta_1: float, theta_2: float, branch: int, model: Model, out: FloatArray) -> bool:
+    """Write the numbers (RESULTS,) of a posture [deg]; return whether it is feasible.
 
-    `links` (7, count) are sine and cosine of θ1, of θ1 + θ2 and of θ1 + θ2 + θ3 (beyond ±1 and NaN
-    out of reach), and that angle [deg], the third link to +x; it points to −x in branch 1.
+    The third link points to +x in branch 0, to −x in branch 1.
     """
-    task, weights, _, limits = model
-    l1, l2, l3, x_e, _, f_x, f_y = task
+    task, weights, avoided, limits = model
+    l1, l2, l3, x_e, y_e, f_x, f_y = task
     epsilon, lam, delta, a1, a2, a3, cap = weights
-    sign = -1.0 if branch == 1 else 1.0
-    s1, c1, s12, c12, s123 = links[0], links[1], links[2], links[3], links[4]
-    c123, absolute = links[5], links[6]
-    obstacles = out[OBSTACLE]
-    _obstacle_lanes(count, links, sign, model, obstacles)
-    # all other criteria, limits, cost
-    low_1, high_1, low_2, high_2 = limits[0, 0], limits[0, 1], limits[1, 0], limits[1, 1]
-    low_3, high_3, least_1, most_1 = limits[2, 0], limits[2, 1], limits[3, 0], limits[3, 1]
-    least_2, most_2, least_3, most_3 = limits[4, 0], limits[4, 1], limits[5, 0], limits[5, 1]
-    for k in range(count):
-        theta_1, theta_2 = angles[0, k], angles[1, k]
-        theta_3 = (180.0 - absolute[k] if branch == 1 else absolute[k]) - theta_1 - theta_2
-        theta_3 -= 360.0 * np.floor((theta_3 + 180.0) / 360.0)
-        x1, x2, x3 = l1 * c1[k], l2 * c12[k], l3 * (sign * c123[k])
-        y1, y2, y3 = l1 * s1[k], l2 * s12[k], l3 * s123[k]
-        jx1, jx2, jx3 = -(y1 + y2 + y3), -(y2 + y3), -y3
-        jy1, jy2, jy3 = x1 + x2 + x3, x2 + x3, x3
-        t1, t2, t3 = jx1 * f_x + jy1 * f_y, jx2 * f_x + jy2 * f_y, jx3 * f_x + jy3 * f_y  # Eq. 8
-        norm = 0.0 + t1 * t1 + t2 * t2 + t3 * t3  # Eq. 10
-        b1, b2, b3 = abs(a1 * t1), abs(a2 * t2), abs(a3 * t3)
-        largest = b1 if b1 > b2 else b2
-        largest = b3 if b3 > largest else largest  # Eq. 11
-        reached = abs(s123[k]) <= 1.0
-        free = reached & (low_1 <= theta_1) & (theta_1 <= high_1)
-        free = free & (low_2 <= theta_2) & (theta_2 <= high_2)
-        free = free & (low_3 <= theta_3) & (theta_3 <= high_3) & (least_1 <= t1) & (t1 <= most_1)
-        free = free & (least_2 <= t2) & (t2 <= most_2) & (least_3 <= t3) & (t3 <= most_3)
-        xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
-        yy = jy1 * jy1 + jy2 * jy2 + jy3 * jy3
-        xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
-        singular = _inverse(xx * yy - xy * xy, cap)  # Eq. 13
-        obstacle = obstacles[k]
-        total = obstacle + epsilon * norm + lam * largest + delta * singular  # Eq. 14
-        out[TORQUE_NORM, k] = norm if reached & (norm < cap) else cap
-        out[TORQUE_MAX, k] = largest if reached & (largest < cap) else cap
-        out[MANIPULABILITY, k] = singular if reached else cap
-        out[OBSTACLE, k] = obstacle if reached & (obstacle < cap) else cap
-        out[COST, k] = total if free & (total < cap) else cap
-        out[TORQUE, k] = t1 if reached else np.nan
-        out[TORQUE + 1, k] = t2 if reached else np.nan
-        out[TORQUE + 2, k] = t3 if reached else np.nan
-        out[THETA_3, k], out[PLATFORM, k] = theta_3, x_e - (x1 + x2 + x3)  # Eq. 17
-        within[k] = free
-
-
-@kernel
-def _obstacle_lanes(
-    count: int, links: FloatArray, sign: float, model: Model, obstacles: FloatArray
-) -> None:
-    """Write Σ γ E_obs (Eq. 12) of a population; `sign` of the third link's extent along x."""
-    s1, c1, s12, c12, s123, c123 = links[0], links[1], links[2], links[3], links[4], links[5]
-    avoided, cap = model.avoided, model.weights.greatest
-    l1, l2, l3, x_e, _, _, _ = model.task
-    obstacles[:] = 0.0
+    # directions of the links; the third brings the end-effector to its height (Eq. 18)
+    s1, c1 = sincos(DEGREE * theta_1)
+    s12, c12 = sincos(DEGREE * (theta_1 + theta_2))
+    s123 = (y_e - l1 * s1 - l2 * s12) / l3
+    reached, c123, absolute = abs(s123) <= 1.0, np.nan, np.nan
+    if reached:
+        c123, absolute = np.sqrt((1.0 - s123) * (1.0 + s123)), asin(s123) / DEGREE
+    if branch == 1:
+        c123, absolute = -c123, 180.0 - absolute
+    theta_3 = absolute - theta_1 - theta_2
+    theta_3 -= 360.0 * np.floor((theta_3 + 180.0) / 360.0)
+    x1, x2, x3 = l1 * c1, l2 * c12, l3 * c123
+    y1, y2, y3 = l1 * s1, l2 * s12, l3 * s123
+    platform = x_e - (x1 + x2 + x3)  # Eq. 17
+    # columns of the Jacobian, torques (Eq. 8) and their criteria (Eqs. 10 and 11)
+    jx1, jx2, jx3 = -(y1 + y2 + y3), -(y2 + y3), -y3
+    jy1, jy2, jy3 = x1 + x2 + x3, x2 + x3, x3
+    t1, t2, t3 = jx1 * f_x + jy1 * f_y, jx2 * f_x + jy2 * f_y, jx3 * f_x + jy3 * f_y
+    norm = t1 * t1 + t2 * t2 + t3 * t3
+    b1, b2, b3 = abs(a1 * t1), abs(a2 * t2), abs(a3 * t3)
+    largest = b1 if b1 > b2 else b2
+    largest = b3 if b3 > largest else largest
+    # limits
+    free, values = reached, (theta_1, theta_2, theta_3, t1, t2, t3)
+    for k in range(6):
+        free &= (limits[k, 0] <= values[k]) & (values[k] <= limits[k, 1])
+    # manipulability (Eq. 13), obstacles (Eq. 12), cost (Eq. 14)
+    xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
+    yy = jy1 * jy1 + jy2 * jy2 + jy3 * jy3
+    xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
+    singular, obstacle = _inverse(xx * yy - xy * xy, cap), 0.0
     for n in range(len(avoided)):
-        weight, link, place = avoided[n, 0], avoided[n, 1], avoided[n, 2]
-        x_o, y_o = avoided[n, 3], avoided[n, 4]
+        link, place = avoided[n, 1], avoided[n, 2]
         first = (place if link == 1.0 else 1.0) * (link >= 1.0)
         second, third = (place if link == 2.0 else 1.0) * (link >= 2.0), place * (link >= 3.0)
-        for k in range(count):
-            x1, x2, x3 = l1 * c1[k], l2 * c12[k], l3 * (sign * c123[k])
-            y1, y2, y3 = l1 * s1[k], l2 * s12[k], l3 * s123[k]
-            platform = x_e - (x1 + x2 + x3)
-            x, y = platform + first * x1, first * y1
-            x += second * x2 + third * x3
-            y += second * y2 + third * y3
-            dx, dy = x - x_o, y - y_o
-            obstacles[k] += weight * _inverse(dx * dx + dy * dy, cap)
+        dx = platform + first * x1 + (second * x2 + third * x3) - avoided[n, 3]
+        dy = first * y1 + (second * y2 + third * y3) - avoided[n, 4]
+        obstacle += avoided[n, 0] * _inverse(dx * dx + dy * dy, cap)
+    total = obstacle + epsilon * norm + lam * largest + delta * singular
+    out[TORQUE_NORM] = norm if reached & (norm < cap) else cap
+    out[TORQUE_MAX] = largest if reached & (largest < cap) else cap
+    out[MANIPULABILITY] = singular if reached else cap
+    out[OBSTACLE] = obstacle if reached & (obstacle < cap) else cap
+    out[COST] = total if free & (total < cap) else cap
+    for k in range(3):
+        out[TORQUE + k] = values[3 + k] if reached else np.nan
+    out[THETA_3], out[PLATFORM] = theta_3, platform
+    return bool(free)

@@ -85,34 +85,17 @@ def walk(
         else:
             weigh_moves(moves, node, own)
             move = drawn_move(uniforms[at], own)
-        following = neighbours[node, move]
-        if erase:
-            place[node] = following
-        else:
-            if count == len(path) - 1:  # full: a path without loops always fits
-                erase_loops(path, count, path, place)
-                count = path[0]
-            count += 1
-            path[count] = following
-        node = following
-        at += 1
-    taken[0] = at if node == target else num + 1
-    if not erase:
-        path[0] = count
-    elif node == target:
-        follow_exits(place, ends, path)
-
-
-@kernel
-def follow_exits(exits: NodeArray, ends: tuple[int, int], path: NodeArray) -> None:
-    """Write a walk without its loops: every node's last exit (nodes,) leads on (Wilson 1996)."""
-    node, target, count = np.uint64(ends[0]), np.uint64(ends[1]), 1
-    path[1] = node
-    while node != target:
-        node = np.uint64(exits[node])
+        node = neighbours[node, move]
+        if count == len(path) - 1:  # full: a path without loops always fits
+            erase_loops(path, count, path, place)
+            count = path[0]
         count += 1
         path[count] = node
+        at += 1
+    taken[0] = at if node == target else num + 1
     path[0] = count
+    if erase:
+        erase_loops(path, count, path, place)
 
 
 @kernel
@@ -137,7 +120,7 @@ def walk_all(
     words, neighbours, sums, paths = borrowed((words, neighbours, sums, paths))
     nodes, target = len(neighbours), np.uint64(ends[1])
     here, rows = np.full(LANES, np.uint64(ends[0])), np.arange(LANES)
-    # of each walker its last exit from each node; where loops are kept its nodes, from index 1 on
+    # the nodes of each walker, from index 1 on
     trails, counts = np.empty((LANES, nodes + 1), dtype=np.int32), np.ones(LANES, dtype=np.int64)
     trails[:, 1] = ends[0]
     place = np.empty(nodes, dtype=np.int32)
@@ -147,32 +130,28 @@ def walk_all(
         if drawn > len(words):
             return -1
         # a step of every walker
-        has_arrived = False
+        needs_care = False
         for walker in range(LANES):
             word, node = words[taken + (walker >> 1)], here[walker]
             bits = word >> HALF if walker & 1 else word & LOW
             move = drawn_move(SHARE * np.float64(bits), sums[node])
             following = here[walker] = np.uint64(neighbours[node, move])
-            if erase:
-                trails[walker, node] = following
-            else:
-                counts[walker] += 1
-                trails[walker, counts[walker]] = following
-            has_arrived |= following == target
+            counts[walker] += 1
+            trails[walker, counts[walker]] = following
+            needs_care |= (following == target) | (counts[walker] == nodes)
         taken += WORDS
         # who has arrived begins the next path
-        for walker in range(LANES if has_arrived or not erase else 0):
-            trail, count = trails[walker], counts[walker]
+        for walker in range(LANES if needs_care else 0):
+            trail, count, row = trails[walker], counts[walker], rows[walker]
             if here[walker] == target:
-                row = rows[walker]
                 if row < len(paths) and erase:
-                    follow_exits(trail, ends, paths[row])
+                    erase_loops(trail, count, paths[row], place)
                 elif row < len(paths):
                     paths[row, 0], paths[row, 1 : count + 1] = count, trail[1 : count + 1]
                 complete += row < len(paths)
                 rows[walker], here[walker], counts[walker] = begun, np.uint64(ends[0]), 1
                 begun += 1
-            elif not erase and count == nodes:  # full: a path without loops always fits
+            elif count == nodes:  # full: a path without loops always fits
                 erase_loops(trail, count, trail, place)
                 counts[walker] = trail[0]
     return drawn
@@ -182,7 +161,8 @@ def walk_all(
 def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
     """Write a path of `count` nodes, from index 1 on, without its loops; it may be `path` itself.
 
-    The nodes between two visits of a node are left out.
+    The nodes between two visits of a node are left out: every node's last exit leads on (Wilson
+    1996).
     """
     for k in range(1, count + 1):
         place[nodes[k]] = k

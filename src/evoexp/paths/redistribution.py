@@ -1,10 +1,14 @@
 """Redistribution of via-points to equal arc length (Rana & Zalzala 1995, section 3.3).
 
-Eight paths of an arm at a time, as vectors: fit the splines, integrate the speed (`arc_length`),
-then find for the targets L·i/N their segment (every segment is entered at the first target at or
-after its begin; a running maximum fills the gaps) and within it the sample, by counting the lengths
-that are not beyond. Between two samples the speed is taken as linear, which inverts in closed form;
-the point is the spline's there.
+A cubic spline through the via-points over their index has speeds at equidistant samples; their
+running integral is the arc length. Via-point i moves to where the length is L·i/N. Between two
+samples the speed is taken as linear, which inverts in closed form. Eight paths of an arm are
+treated at a time, as vectors; what differs from path to path is read number by number.
+
+On segment k, with u in [0, 1], a and m (a sixth of the second derivative) at both ends:
+
+    s(u)  = a0 + u (b0 + u (b1/2 + u b2/3)),   s'(u) = b0 + u (b1 + u b2),
+    b0 = a1 − a0 − 2 m0 − m1,   b1 = 6 m0,   b2 = 3 (m1 − m0).
 
 Accuracy: root mean square (and largest) distance from the converged points in units of their
 spacing, 100 paths of 21 points in the plane, fresh walks and populations just crossed over:
@@ -20,166 +24,205 @@ paths have, the speed is hardly smooth.
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vector_rows import (
-    lane_numbers,
-    load_each,
-    load_pairs,
-    load_quads,
-    num_up_to,
-    store_places,
-)
-from evoexp.numeric.vectors import (
-    Vector,
-    any_lane,
-    ceiling,
-    load,
-    root,
-    select,
-    spread,
-    store,
-    upper,
-)
-from evoexp.paths.arc_length import integrate_speed
-from evoexp.paths.spline import fit_splines, write_rows
-from evoexp.paths.workspace import (
-    U0,
-    U1,
-    U4,
-    VECTOR,
-    Layout,
-    Offsets,
-    Redistribution,
-    layout,
-)
+from evoexp.numeric.vectors import LANES, Vector, ceiling, load, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
 
-_LONGEST = 1e300  # a longer path has overflowed (garbage in a padded lane) and stays as it is
+VECTOR, ONE = np.uint64(LANES), np.uint64(1)
+PAIR = np.uint64(2 * LANES)  # places of a knot: eight a, eight m
+LONGEST = 1e300  # a longer path has overflowed (garbage in a padded lane) and stays as it is
 
 
-@inlined
-def enter_segments(
-    w: FloatArray, N: np.uint64, at: Layout, origin: Vector, total: Vector, places: Offsets
-) -> None:
-    """Enter every segment in the first target at or after its begin, of several the last one.
+@kernel
+def spline_pivots(num: int, is_clamped: bool) -> FloatArray:
+    """Return the reciprocal pivots (N + 1,) of the equations for m.
 
-    Targets without one have 0.
+    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add the
+    first equation 2 m[0] + m[1] = a[1] − a[0] and the last, m[N−1] + 2 m[N] = a[N−1] − a[N].
+    Natural ones have m[0] = m[N] = 0, which a reciprocal of zero achieves.
     """
-    n = np.float64(N)
-    per_part, nothing = n / total, spread(0.0)
-    for i in range(N + U1):
-        store(w, at.entered + i * VECTOR, nothing)
-    for k in range(U1, N):
-        target = ceiling((load(w, at.begins + k * VECTOR) - origin) * per_part)
-        target = select(target < n, target, spread(n))  # so that NaN, too, becomes a valid index
-        target = select(target > 0.0, target, nothing)
-        store_places(places, U0, 8.0 * target + lane_numbers())
-        for lane in range(VECTOR):
-            w[at.entered + places[lane]] = np.float64(k)
+    pivots = np.zeros(num + 1)
+    pivots[0] = 0.5 if is_clamped else 0.0
+    for i in range(1, num):
+        pivots[i] = 1.0 / (4.0 - pivots[i - 1])
+    pivots[num] = 1.0 / (2.0 - pivots[num - 1]) if is_clamped else 0.0
+    return pivots
 
 
 @inlined
-def find_samples(
-    w: FloatArray,
-    N: np.uint64,
-    S: np.uint64,
-    at: Layout,
-    origin: Vector,
-    total: Vector,
-    places: Offsets,
-) -> None:
-    """Write targets, the last sample of every segment not beyond it, and their places."""
-    segment = spread(0.0)
-    for i in range(U1, N):
-        own = i * VECTOR
-        target = origin + total * (np.float64(i) / np.float64(N))
-        store(w, at.targets + own, target)
-        # the last segment entered up to here
-        segment = upper(segment, load(w, at.entered + own))
-        store_places(places, at.knots + own, np.float64(at.row) * lane_numbers() + 2.0 * segment)
-        begin = np.float64(at.sample) * lane_numbers() + np.float64(S) * segment
-        store_places(places, at.samples + own, begin)
-        # bisection down to eight samples, among which lengths are counted
-        sample = spread(0.0) if S == VECTOR else halve(w, S, at, target, own, places)
-        sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target)
-        store(w, at.found + own, sample)
-        store_places(places, at.samples + own, begin + sample)
-        instant = np.float64(S) * segment + sample
-        store_places(places, at.instants + own, 8.0 * instant + lane_numbers())
-
-
-@inlined
-def halve(
-    w: FloatArray, S: np.uint64, at: Layout, target: Vector, own: np.uint64, places: Offsets
-) -> Vector:
-    """Return the first of the eight samples among which each target lies; move its place there."""
-    for lane in range(VECTOR):
-        limit, begin, step = w[at.targets + own + lane], places[at.samples + own + lane], S >> U1
-        place = begin
-        while step > U4:
-            if w[at.lengths + place + step] <= limit:
-                place += step
-            step >>= U1
-        places[at.samples + own + lane] = place
-        w[at.found + own + lane] = np.float64(place - begin)
-    return load(w, at.found + own)
-
-
-@inlined
-def parameter(
-    target: Vector, sample: Vector, speeds: tuple[Vector, Vector], lengths: tuple[Vector, Vector]
-) -> Vector:
-    """Return where a target lies between two samples, in samples from the segment's begin."""
-    v0, v1 = speeds
-    length = lengths[1] - lengths[0]
-    r = target - lengths[0]
-    r = select(r > 0.0, r, spread(0.0))
-    r = select(r < length, r, length)
-    both = v0 + v1
-    begin = length * v0
-    below = begin + root(begin * begin + r * length * (v1 - v0) * both)
-    x = r * both / below
-    x = select(below > 0.0, x, spread(0.0))
-    return sample + select(x < 1.0, x, spread(1.0))
-
-
-@inlined
-def move_points(
-    via_points: FloatArray,
-    first: np.uint64,
-    pitch: np.uint64,
+def fit_splines(
+    via_points: FloatArray,  # see `redistribute_arms`, flat
+    first: np.uint64,  # place of point 0 of the arm's first joint
+    pitch: np.uint64,  # distance of two points
     joints: np.uint64,
     N: np.uint64,
-    S: np.uint64,
-    w: FloatArray,
-    at: Layout,
-    total: Vector,
-    places: Offsets,
+    pivots: FloatArray,
+    knots: FloatArray,  # (joints · (N + 1) · 16,) written: a and m of knot i of joint j
 ) -> None:
-    """Move the points 1..N−1 of eight paths; those without length or overflown stay."""
-    h = 1.0 / np.float64(S)
-    moves = select(total > 0.0, select(total < _LONGEST, spread(1.0), spread(0.0)), spread(0.0))
-    any_stays = any_lane(moves < 1.0)
-    # between two samples the speed is linear
-    for i in range(U1, N):
-        own = i * VECTOR
-        speeds = (
-            load_each(w, places, at.instants + own, at.speeds),
-            load_each(w, places, at.instants + own, at.speeds + VECTOR),
-        )
-        lengths = load_pairs(w, places, at.samples + own, at.lengths)
-        target, sample = load(w, at.targets + own), load(w, at.found + own)
-        store(w, at.found + own, parameter(target, sample, speeds, lengths) * h)
-    # the splines there
+    """Copy the coordinates of eight paths and solve for m (Thomas algorithm)."""
     for joint in range(joints):
-        start, rows = first + joint * (N + U1) * pitch, at.rows + joint * at.joint
-        for i in range(U1, N):
-            own, place = i * VECTOR, start + i * pitch
-            u = load(w, at.found + own)
-            a0, m0, a1, m1 = load_quads(w, places, at.knots + own, rows)
-            x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
-            if any_stays:
-                x = select(moves < 1.0, load(via_points, place), x)
-            store(via_points, place, x)
+        source, knot = first + joint * (N + ONE) * pitch, joint * (N + ONE) * PAIR
+        before, here = load(via_points, source), load(via_points, source + pitch)
+        # forward: the equations of `spline_pivots`, each freed of the unknown before
+        m = (here - before) * pivots[0]
+        store(knots, knot, before)
+        store(knots, knot + VECTOR, m)
+        for i in range(ONE, N):
+            after = load(via_points, source + (i + ONE) * pitch)
+            m = ((before - here) + (after - here) - m) * pivots[i]
+            store(knots, knot + i * PAIR, here)
+            store(knots, knot + i * PAIR + VECTOR, m)
+            before, here = here, after
+        m = ((before - here) - m) * pivots[N]
+        store(knots, knot + N * PAIR, here)
+        store(knots, knot + N * PAIR + VECTOR, m)
+        # backward: the unknowns
+        for back in range(N):
+            place = knot + (N - ONE - back) * PAIR + VECTOR
+            m = load(knots, place) - m * pivots[N - ONE - back]
+            store(knots, place, m)
+
+
+@inlined
+def slope(knots: FloatArray, knot: np.uint64) -> tuple[Vector, Vector, Vector]:
+    """Return b0, b1, b2 of one joint on the segment that begins at a knot."""
+    a0, m0 = load(knots, knot), load(knots, knot + VECTOR)
+    a1, m1 = load(knots, knot + PAIR), load(knots, knot + PAIR + VECTOR)
+    return a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
+
+
+@inlined
+def write_speeds(
+    knots: FloatArray, joints: np.uint64, N: np.uint64, S: np.uint64, speeds: FloatArray
+) -> None:
+    """Write the speeds |s'| of eight paths at all samples, and at one beyond the goal."""
+    h, pitch = 1.0 / np.float64(S), (N + ONE) * PAIR
+    for k in range(N):
+        x, place = slope(knots, k * PAIR), k * S * VECTOR
+        if joints == np.uint64(2):
+            y = slope(knots, pitch + k * PAIR)
+            for s in range(S):
+                u = np.float64(s) * h
+                one, two = x[0] + u * (x[1] + u * x[2]), y[0] + u * (y[1] + u * y[2])
+                store(speeds, place + s * VECTOR, root(one * one + two * two))
+            continue
+        # coefficients of the square, which rounding may make negative
+        b0, b1, b2 = x
+        q0, q1, q2 = b0 * b0, 2.0 * b0 * b1, b1 * b1 + 2.0 * b0 * b2
+        q3, q4 = 2.0 * b1 * b2, b2 * b2
+        for joint in range(ONE, joints):
+            b0, b1, b2 = slope(knots, joint * pitch + k * PAIR)
+            q0, q1, q2 = q0 + b0 * b0, q1 + 2.0 * b0 * b1, q2 + (b1 * b1 + 2.0 * b0 * b2)
+            q3, q4 = q3 + 2.0 * b1 * b2, q4 + b2 * b2
+        for s in range(S):
+            u = np.float64(s) * h
+            square = q0 + u * (q1 + u * (q2 + u * (q3 + u * q4)))
+            store(speeds, place + s * VECTOR, root(select(square > 0.0, square, spread(0.0))))
+    # at the goal; beyond it the speed is that of the parabola through the last three samples
+    squares, goal = spread(0.0), N * S * VECTOR
+    for joint in range(joints):
+        knot = joint * pitch + (N - ONE) * PAIR
+        a0, m0 = load(knots, knot), load(knots, knot + VECTOR)
+        a1, m1 = load(knots, knot + PAIR), load(knots, knot + PAIR + VECTOR)
+        end = (a1 - a0) + m0 + 2.0 * m1
+        squares = squares + end * end
+    v, p1, p2 = root(squares), load(speeds, goal - VECTOR), load(speeds, goal - PAIR)
+    store(speeds, goal, v)
+    store(speeds, goal + VECTOR, 3.0 * (v - p1) + p2)
+
+
+@inlined
+def between(v0: Vector, v1: Vector, v2: Vector, v3: Vector) -> Vector:
+    """Return 24/h times the length between the samples 1 and 2 of four speeds.
+
+    It is that of the cubic through them, h/24 (13 (v1 + v2) − v0 − v3), yet at or above a twelfth
+    of the trapezoid's, so that lengths never fall where a path turns on the spot.
+    """
+    inner = v1 + v2
+    length = 13.0 * inner - (v0 + v3)
+    return select(inner < length, length, inner)
+
+
+@inlined
+def integrate_speed(speeds: FloatArray, num_samples: np.uint64, lengths: FloatArray) -> None:
+    """Write the lengths up to all samples; their origin is arbitrary (not zero)."""
+    v0, v1, v2 = spread(0.0), load(speeds, np.uint64(0)), load(speeds, VECTOR)
+    length = between(v0, v0, v0, v1) + between(v0, v0, v1, v2)
+    for s in range(num_samples):
+        place = s * VECTOR
+        v3 = load(speeds, place + PAIR)
+        following = length + between(v0, v1, v2, v3)
+        if s == np.uint64(0):
+            # before the start, too, the speed is that of a parabola
+            length = following - between(3.0 * (v1 - v2) + v3, v1, v2, v3)
+        store(lengths, place, length)
+        length, v0, v1, v2 = following, v1, v2, v3
+    store(lengths, num_samples * VECTOR, length)
+
+
+@inlined
+def find_places(
+    speeds: FloatArray,
+    lengths: FloatArray,
+    N: np.uint64,
+    S: np.uint64,
+    segments: IntArray,  # (N · 8,) written: the segment of every target
+    places: FloatArray,  # (N · 8,) written: u of every target in it
+) -> None:
+    """Find every target L·i/N of eight paths."""
+    n, h, origin = np.float64(N), 1.0 / np.float64(S), load(lengths, np.uint64(0))
+    total = load(lengths, N * S * VECTOR) - origin
+    per_part = n / total
+    # every segment is entered at the first target at or after its begin, of several the last one
+    segments[:] = 0
+    for k in range(ONE, N):
+        target = ceiling((load(lengths, k * S * VECTOR) - origin) * per_part)
+        target = select(target < n, target, spread(n))  # NaN, too, becomes a valid index
+        store(places, k * VECTOR, select(target > 0.0, target, spread(0.0)))
+    for k in range(ONE, N):
+        for lane in range(VECTOR):
+            segments[np.uint64(places[k * VECTOR + lane]) * VECTOR + lane] = k
+    around = np.empty(4 * LANES)  # speeds and lengths at the samples around eight targets
+    for i in range(ONE, N):
+        own, target = i * VECTOR, origin + total * (np.float64(i) / n)
+        store(places, own, target)
+        for lane in range(VECTOR):
+            # the last segment entered up to here; its last sample not beyond the target
+            place = own + lane
+            segment = max(segments[place], segments[place - VECTOR])
+            segments[place] = segment
+            at, step, limit = np.uint64(segment) * S, S >> ONE, places[place]
+            while step > np.uint64(0):
+                if lengths[(at + step) * VECTOR + lane] <= limit:
+                    at += step
+                step >>= ONE
+            sample = at * VECTOR + lane
+            around[lane], around[lane + VECTOR] = speeds[sample], speeds[sample + VECTOR]
+            around[lane + PAIR] = lengths[sample]
+            around[lane + PAIR + VECTOR] = lengths[sample + VECTOR]
+            places[place] = np.float64(at - np.uint64(segment) * S)
+        # between two samples the speed is linear
+        v0, v1 = load(around, np.uint64(0)), load(around, VECTOR)
+        l0, l1 = load(around, PAIR), load(around, PAIR + VECTOR)
+        length, both, r = l1 - l0, v0 + v1, target - l0
+        r = select(r > 0.0, r, spread(0.0))
+        r = select(r < length, r, length)
+        begin = length * v0
+        below = begin + root(begin * begin + r * length * (v1 - v0) * both)
+        x = select(below > 0.0, r * both / below, spread(0.0))
+        store(places, own, (load(places, own) + select(x < 1.0, x, spread(1.0))) * h)
+
+
+@inlined
+def point_at(knots: FloatArray, knot: np.uint64, u: float) -> float:
+    """Return s(u) of one path on the segment that begins at a knot."""
+    a0, m0, a1, m1 = (
+        knots[knot],
+        knots[knot + VECTOR],
+        knots[knot + PAIR],
+        knots[knot + PAIR + VECTOR],
+    )
+    point: float = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
+    return point
 
 
 @kernel
@@ -188,29 +231,38 @@ def redistribute_arms(
     via_points: FloatArray,
     arm_slices: IntArray,  # (arms, 2) first and last-plus-one joint of each arm
     num_lanes: int,  # that are treated, a multiple of eight; those behind are left alone
-    spline: Redistribution,
+    samples: int,  # speeds per segment, a power of two
+    is_clamped: bool,  # whether the splines' slopes at both ends are zero
 ) -> None:
     """Move the via-points of every arm's path to equal arc length along its spline, in place.
 
-    The spline runs over the index 0..N (Rana & Zalzala 1995, Sect. 3.3). The end points keep their
-    bits; a path without length keeps all of them. Lengths come from `samples_per_segment` speeds
-    per segment by a rule of fourth order: 8 are about as accurate as 16 chords, 16 about five times
-    better.
+    The end points keep their bits; a path without length keeps all of them. Lengths come from
+    speeds by a rule of fourth order: 8 per segment are about as accurate as 16 chords, 16 about
+    five times better.
     """
-    flat, spline = borrowed((via_points.reshape(-1), spline))
-    samples, pivots, w, integers = spline
     N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples)
-    pitch = np.uint64(via_points.shape[2])
-    for arm in range(arm_slices.shape[0]):
+    flat, pitch = borrowed(via_points.reshape(-1)), np.uint64(via_points.shape[2])
+    pivots = spline_pivots(via_points.shape[1] - 1, is_clamped)
+    most = np.uint64(np.max(arm_slices[:, 1] - arm_slices[:, 0]))
+    knots = np.empty(most * (N + ONE) * PAIR)
+    speeds, lengths = np.empty((N * S + np.uint64(2)) * VECTOR), np.empty((N * S + ONE) * VECTOR)
+    places, segments = np.empty((N + ONE) * VECTOR), np.empty((N + ONE) * VECTOR, dtype=np.int64)
+    for arm in range(len(arm_slices)):
         joint = np.uint64(arm_slices[arm, 0])
         joints = np.uint64(arm_slices[arm, 1]) - joint
-        at = layout(joints, N, S)
-        for lane in range(U0, np.uint64(num_lanes), VECTOR):
-            first = joint * (N + U1) * pitch + lane
-            fit_splines(flat, first, pitch, joints, N, pivots, w, at)
-            write_rows(joints, w, at)
-            origin, last = integrate_speed(w, joints, N, S, at)
-            total = last - origin
-            enter_segments(w, N, at, origin, total, integers)
-            find_samples(w, N, S, at, origin, total, integers)
-            move_points(flat, first, pitch, joints, N, S, w, at, total, integers)
+        for start in range(np.uint64(0), np.uint64(num_lanes), VECTOR):
+            first = joint * (N + ONE) * pitch + start
+            fit_splines(flat, first, pitch, joints, N, pivots, knots)
+            write_speeds(knots, joints, N, S, speeds)
+            integrate_speed(speeds, N * S, lengths)
+            find_places(speeds, lengths, N, S, segments, places)
+            # the splines there; paths without length and overflown ones stay
+            for lane in range(VECTOR):
+                total = lengths[N * S * VECTOR + lane] - lengths[lane]
+                if 0.0 < total < LONGEST:
+                    for j in range(joints):
+                        place, rows = first + j * (N + ONE) * pitch + lane, j * (N + ONE) * PAIR
+                        for i in range(ONE, N):
+                            own = i * VECTOR + lane
+                            knot = rows + np.uint64(segments[own]) * PAIR + lane
+                            flat[place + i * pitch] = point_at(knots, knot, places[own])

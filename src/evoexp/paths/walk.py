@@ -4,10 +4,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.vectors import LANES, Vector, load, magnitude, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
-
-VECTOR, ONE = np.uint64(LANES), np.uint64(1)
 
 
 def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
@@ -33,95 +30,63 @@ def walk_strings(
     angle: in the plane of two joints the one angle, in space azimuth and elevation, and so on. The
     goal itself is the last point. An arm of one joint has no angle to turn.
     """
-    memory = np.empty((3, len(start) * LANES))
-    ends, scratch = (start, goal), (memory[0], memory[1], memory[2])
-    for first in range(0, len(lanes), LANES):
-        own = slice(first, min(first + LANES, len(lanes)))
-        _walk_eight(
-            via_points, lanes[own], uniforms[own], ends, arm_slices, step, max_turn, scratch
-        )
-
-
-@kernel
-def _walk_eight(
-    via_points: FloatArray,
-    lanes: IntArray,
-    uniforms: FloatArray,
-    ends: tuple[FloatArray, FloatArray],
-    arm_slices: IntArray,
-    step: float,
-    max_turn: float,
-    scratch: tuple[FloatArray, FloatArray, FloatArray],
-) -> None:
-    """Write up to eight strings, as vectors."""
-    via_points, lanes, uniforms, ends, scratch = borrowed(
-        (via_points, lanes, uniforms, ends, scratch)
-    )
-    (start, goal), (here, direction, drawn) = ends, scratch
-    num, count, taken = via_points.shape[1] - 1, len(lanes), 0
-    drawn[:] = 0.0  # for the lanes without a string
-    for arm in range(len(arm_slices)):
-        first, stop = np.uint64(arm_slices[arm, 0]), np.uint64(arm_slices[arm, 1])
-        squared = 0.0
-        for j in range(first, stop):
-            store(here, j * VECTOR, spread(start[j]))
-            squared += (goal[j] - start[j]) * (goal[j] - start[j])
-            for s in range(count):
-                via_points[j, 0, lanes[s]] = start[j]
-                via_points[j, num, lanes[s]] = goal[j]
-        length = step * np.sqrt(squared) / num
-        for i in range(1, num):
-            # one angle less than joints
-            for t in range(stop - first - ONE):
-                for s in range(count):
-                    drawn[t * VECTOR + np.uint64(s)] = uniforms[s, taken]
-                taken += 1
-            # the direction of the goal, turned
+    via_points, lanes, uniforms = borrowed((via_points, lanes, uniforms))
+    num, here, direction = via_points.shape[1] - 1, np.empty(len(start)), np.empty(len(start))
+    for s in range(len(lanes)):
+        lane, taken = lanes[s], 0
+        via_points[:, 0, lane], via_points[:, num, lane] = start, goal
+        here[:] = start
+        for arm in range(len(arm_slices)):
+            first, stop = arm_slices[arm, 0], arm_slices[arm, 1]
+            squared = 0.0
             for j in range(first, stop):
-                store(direction, j * VECTOR, goal[j] - load(here, j * VECTOR))
-            scale = length * _turn(direction, first, stop, drawn, max_turn)
-            for j in range(first, stop):
-                there = load(here, j * VECTOR) + scale * load(direction, j * VECTOR)
-                store(here, j * VECTOR, there)
-                for s in range(count):
-                    via_points[j, i, lanes[s]] = here[j * VECTOR + np.uint64(s)]
+                squared += (goal[j] - start[j]) * (goal[j] - start[j])
+            length = step * np.sqrt(squared) / num
+            for i in range(1, num):
+                # the direction of the goal, turned; one angle less than joints
+                for j in range(first, stop):
+                    direction[j] = goal[j] - here[j]
+                scale = length * _turn(direction, first, stop, uniforms[s], taken, max_turn)
+                taken += stop - first - 1
+                for j in range(first, stop):
+                    here[j] = here[j] + scale * direction[j]
+                    via_points[j, i, lane] = here[j]
 
 
 @inlined
 def _turn(
-    direction: FloatArray, first: np.uint64, stop: np.uint64, drawn: FloatArray, max_turn: float
-) -> Vector:
-    """Turn the hyperspherical angles of eight directions; return the factors to unit length.
+    direction: FloatArray,
+    first: int,
+    stop: int,
+    uniforms: FloatArray,
+    taken: int,  # place of the first number
+    max_turn: float,
+) -> float:
+    """Turn the hyperspherical angles of an arm's direction; return the factor to unit length.
 
     The azimuth is turned first. The angle of coordinate k stands between the axis k and the vector
     of the coordinates before it, of length `below`. Turning it takes (below, direction[k]) around;
     the coordinates before keep their proportions. A direction straight along a later axis has
     azimuth 0.
     """
-    x, nothing = load(direction, first * VECTOR), spread(0.0)
-    if stop - first == ONE:
-        return select(x == nothing, nothing, 1.0 / magnitude(x))
-    second = (first + ONE) * VECTOR
-    y = load(direction, second)
-    sine, cosine = sincos((2.0 * load(drawn, np.uint64(0)) - 1.0) * max_turn)
-    flat = below = root(x * x + y * y)
-    azimuth_x, azimuth_y = cosine, sine
-    turned_x, turned_y = x * cosine - y * sine, x * sine + y * cosine
-    store(direction, first * VECTOR, turned_x)
-    store(direction, second, turned_y)
-    for k in range(first + ONE + ONE, stop):
-        sine, cosine = sincos((2.0 * load(drawn, (k - first - ONE) * VECTOR) - 1.0) * max_turn)
-        here = load(direction, k * VECTOR)
-        turned, lies_on_axis = below * cosine - here * sine, below == nothing
-        store(direction, k * VECTOR, below * sine + here * cosine)
+    x = direction[first]
+    if stop - first == 1:
+        return 0.0 if x == 0.0 else 1.0 / abs(x)
+    y = direction[first + 1]
+    sine, cosine = sincos((2.0 * uniforms[taken] - 1.0) * max_turn)
+    below = np.sqrt(x * x + y * y)
+    one, two = x * cosine - y * sine, x * sine + y * cosine
+    direction[first], direction[first + 1] = one, two
+    one, two = (one / below, two / below) if below != 0.0 else (cosine, sine)
+    for k in range(first + 2, stop):
+        sine, cosine = sincos((2.0 * uniforms[taken + k - first - 1] - 1.0) * max_turn)
+        turned = below * cosine - direction[k] * sine
+        beyond = below * sine + direction[k] * cosine
         for j in range(first, k):
-            before = load(direction, j * VECTOR)
-            alone = before
-            if j == first:
-                alone = turned * select(flat == nothing, azimuth_x, turned_x / flat)
-            elif j == first + ONE:
-                alone = turned * select(flat == nothing, azimuth_y, turned_y / flat)
-            store(direction, j * VECTOR, select(lies_on_axis, alone, before * (turned / below)))
-        beyond = load(direction, k * VECTOR)
-        below = root(turned * turned + beyond * beyond)
-    return select(below == nothing, nothing, 1.0 / below)
+            alone = direction[j]
+            if j < first + 2:
+                alone = turned * (one if j == first else two)
+            direction[j] = alone if below == 0.0 else direction[j] * (turned / below)
+        direction[k] = beyond
+        below = np.sqrt(turned * turned + beyond * beyond)
+    return 0.0 if below == 0.0 else float(1.0 / below)

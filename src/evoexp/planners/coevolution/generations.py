@@ -1,8 +1,4 @@
-"""One run of co-evolving populations: the way from a generation to the next (Fig. 2).
-
-Of robots that are lines several generations are one call of a kernel: Python between the steps
-would take a third of the time. Others are evaluated by `Coevolution.evaluated`.
-"""
+"""One run of co-evolving populations: the way from a generation to the next (Fig. 2)."""
 
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,20 +11,17 @@ from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.operators.operator import Genome
 from evoexp.evolution.succession import choose_elites, copy_members
-from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.random_stream import DrawnAhead
+from evoexp.numeric.compilation import kernel
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
     Heredity,
-    LineTask,
     copy_fronts,
     count_members,
-    evaluate_lines,
     renew,
     survey,
 )
-from evoexp.planners.driver import TableSearch, generations_per_call
+from evoexp.planners.driver import TableSearch
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
@@ -36,10 +29,7 @@ from evoexp.records import FloatArray, IntArray
 if TYPE_CHECKING:
     from evoexp.planners.coevolution.planner import Coevolution, Problem
 
-NOT_FINITE = "points and bases must be finite and below 1e70"
 MOST = 100  # teams that are judged of one generation; the others are no answer
-PER_CALL = 8  # generations that are computed in one call, at most
-CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
 
 
 class Table(NamedTuple):
@@ -49,38 +39,6 @@ class Table(NamedTuple):
     judged: Evaluated  # of each place
     teams: IntArray  # (places, robots) the best team of each; −1 if there is none
     team_costs: FloatArray  # (places,) inf if there is none
-
-
-@kernel
-def evolve(
-    select: Select,
-    cross: Cross,
-    mutate: Mutate,
-    uniforms: FloatArray,  # numbers for all of them, in the order in which they are used
-    rates: FloatArray,  # (generations,) of mutation, on the way to each of them
-    first: int,  # the present generation
-    task: LineTask,
-    heredity: Heredity,
-    table: Table,  # see `Table`, written
-    num_teams: IntArray,  # (1,) teams that the hall holds, changed
-    summaries: FloatArray,  # (places, 4) written: see `TableSearch`
-    taken: IntArray,  # (generations,) written: how many numbers each of them took
-) -> bool:
-    """Go on from one generation of lines to others; return False if a coordinate is not finite."""
-    table, summaries, taken = borrowed((table, summaries, taken))
-    populations, places, begin = table.populations, len(summaries), 0
-    for step in range(len(rates)):
-        other = (first + step + 1) % places
-        numbers, index = uniforms[begin:], first + step
-        taken[step] = follow(
-            select, cross, mutate, numbers, index, rates[step], heredity, table, num_teams
-        )
-        begin += taken[step]
-        found = at_place(table.judged, other)
-        if not evaluate_lines(populations[other], task, found):
-            return False
-        table.team_costs[other] = survey(found, table.teams[other], summaries[other])
-    return True
 
 
 @kernel
@@ -146,12 +104,6 @@ def follow(
     return int(taken)
 
 
-def per_call(robots: int, count: int) -> int:
-    """Return how many generations of populations of `count` are best computed in one call."""
-    collisions = robots * (robots - 1) * count * count  # [B] of one generation
-    return generations_per_call(PER_CALL, collisions, CACHED)
-
-
 class TeamSearch(TableSearch):
     """One run, and memory for its generations."""
 
@@ -160,9 +112,7 @@ class TeamSearch(TableSearch):
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size
         self._proven = ProvenTeams(planner, problem) if planner.answers_are_proven else None
-        stepwise = not problem.collision.is_lines or ga.restart_after is not None
-        self._at_once = not stepwise and self._proven is None
-        super().__init__(ga, per_call(robots, self._size) if self._at_once else 1)
+        super().__init__(ga, 1)
         num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
         self._table = Table(
             np.empty((self.num_places, robots, num_genes, self._size)),
@@ -196,32 +146,23 @@ class TeamSearch(TableSearch):
         self._judge(0)
         most = int(np.count_nonzero(self._problem.moving))
         most *= int(self._heredity.breeding.sizes.sum(axis=1).max())
-        self._ahead = DrawnAhead(rng, max(most, self._table.populations[0].size))
+        self._most_drawn = max(most, self._table.populations[0].size)
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Compute generations with numbers that are drawn ahead."""
-        uniforms = self._ahead.draw(last - first)
-        rates = np.array([self._planner.ga.mutation_rate_at(k + 1) for k in range(first, last)])
-        arguments = self._heredity, self._table, self._num_teams
-        taken = np.empty(len(rates), dtype=np.int64)
-        if not self._at_once:
-            taken[0] = self._follow(uniforms, float(rates[0]), first)
-            self._judge(last % self.num_places)
-        else:
-            task, (select, cross, mutate) = self._planner.task(self._problem), self._operators
-            given = task, *arguments, self.summaries, taken
-            if not evolve(select, cross, mutate, uniforms, rates, first, *given):
-                raise ValueError(NOT_FINITE)
-        self.states = self._ahead.take(taken.tolist())
+        """Breed and judge the generation behind one."""
+        state, uniforms = rng.bit_generator.state, rng.random(self._most_drawn)
+        taken = self._follow(uniforms, first)
+        rng.bit_generator.state = state  # the generator goes on behind the numbers that were taken
+        rng.random(taken)
+        self._judge(last % self.num_places)
         return last
 
-    def _follow(self, uniforms: FloatArray, rate: float, index: int) -> int:
+    def _follow(self, uniforms: FloatArray, index: int) -> int:
         """Breed the generation behind one, or begin anew; return how many numbers that took."""
-        self._waiting = 0 if self.keeper.best.solved else self._waiting + 1
-        patience = self._planner.ga.restart_after
-        if patience is None or self._waiting < patience:
+        self._waiting, ga = 0 if self.keeper.best.solved else self._waiting + 1, self._planner.ga
+        if ga.restart_after is None or self._waiting < ga.restart_after:
+            rate, (select, cross, mutate) = ga.mutation_rate_at(index + 1), self._operators
             rules = self._heredity, self._table, self._num_teams
-            select, cross, mutate = self._operators
             return int(follow(select, cross, mutate, uniforms, index, rate, *rules))
         # "If no convergence has occurred, …, the algorithm generates new populations" (section 3)
         populations = self._table.populations[(index + 1) % self.num_places]

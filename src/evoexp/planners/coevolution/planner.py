@@ -24,7 +24,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.answers import in_shape, of_limits, of_place
-from evoexp.planners.coevolution.generations import NOT_FINITE, ProvenTeams, TeamSearch
+from evoexp.planners.coevolution.generations import ProvenTeams, TeamSearch
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
@@ -40,6 +40,7 @@ from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
+NOT_FINITE = "points and bases must be finite and below 1e70"
 PAIR_BYTES = 7  # of a pair of individuals: collisions in two generations, whether they are a team
 
 

@@ -16,7 +16,6 @@ from evoexp.objectives.string_fitness import StringTerms, count_collisions, weig
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.lengths import measure_paths, relax_points
 from evoexp.paths.redistribution import redistribute_arms
-from evoexp.paths.workspace import Redistribution
 from evoexp.records import FloatArray, IntArray
 
 
@@ -25,7 +24,8 @@ class Settings(NamedTuple):
 
     arm_slices: IntArray  # (arms, 2) rows of each arm
     redistribution: bool  # whether to redistribute (section 3.4 c)
-    spline: Redistribution  # its samples, factor and scratch
+    samples: int  # of its arc length between two via-points
+    is_clamped: bool  # whether the slopes at the ends of its spline are zero
     relaxation_step: float  # delta of Eqs. 8, 9
     substeps: int  # configurations tested per segment
     weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7
@@ -126,7 +126,8 @@ def smooth(strings: FloatArray, count: int, settings: Settings) -> None:
     """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c)."""
     lanes = -(-count // 8) * 8  # whole vectors
     if settings.redistribution and count > 0 and strings.shape[1] > 2:
-        redistribute_arms(strings, settings.arm_slices, lanes, settings.spline)
+        arms, samples = settings.arm_slices, settings.samples
+        redistribute_arms(strings, arms, lanes, samples, settings.is_clamped)
     if settings.relaxation_step > 0.0 and count > 0:
         relax_points(strings, settings.relaxation_step, lanes)
 

@@ -18,7 +18,6 @@ from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
 from evoexp.planners.planner import COPIES, JudgementArrays, num_values
@@ -43,13 +42,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
         if self.num_new_trajectories > self.ga.num_offspring:
             must = f"at most the offspring of a generation ({self.ga.num_offspring})"
             raise SettingError("planner.num_new_trajectories", must, self.num_new_trajectories)
-        found = arm_problem(robot, scenario, self.collision)
-        slices = found.arm_slices
-        joints = int(np.max(slices[:, 1] - slices[:, 0]))
-        spline = prepare_redistribution(
-            self.num_via_points, joints, self.spline_end, self.samples_per_segment
-        )
-        return Problem(**vars(found), spline=spline)
+        return Problem(**vars(arm_problem(robot, scenario, self.collision)))
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""

@@ -4,7 +4,6 @@ Strings of robots whose bodies are covered keep within the joints' limits, and e
 generations is a call of its own: testing covered bodies takes far longer than Python between them.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,6 @@ from evoexp.objectives.string_fitness import StringTerms, count_collisions, weig
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
 from evoexp.paths.walk import num_uniforms, walk_strings
-from evoexp.paths.workspace import Redistribution
 from evoexp.planners.answers import JudgementArrays
 from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.driver import GeneticSearch, generations_per_call
@@ -38,11 +36,8 @@ PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
 CACHED = 1 << 19  # [B] and as many as take so much memory
 
 
-@dataclass(frozen=True)
 class Problem(ArmProblem):
     """A robot and its scenario, prepared."""
-
-    spline: Redistribution  # factor and memory of the redistribution; for one thread at a time
 
     @property
     def sphere_radius(self) -> float:
@@ -92,7 +87,8 @@ class Strings:
         self.settings = kernels.Settings(
             arm_slices=problem.arm_slices,
             redistribution=planner.redistribution,
-            spline=problem.spline,
+            samples=planner.samples_per_segment,
+            is_clamped=planner.spline_end == "clamped",
             relaxation_step=planner.relaxation_step,
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,

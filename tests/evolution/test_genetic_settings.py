@@ -102,26 +102,11 @@ def test_distinct_genomes_are_the_default_and_no_part_of_the_canonical_form() ->
         ({"hall_depth": 0.009}, "hall_depth: must be 0, or large enough for one pair"),
         ({"hall_depth": 0.0, "hall_memory": 3}, "hall_memory: must be null where there is no hall"),
         ({"hall_depth": 0.0, "hall_frozen": True}, "hall_frozen: must be false where there is no"),
-        (
-            {"hall_depth": 0.0, "hall_distinct": "index"},
-            "hall_distinct: must be genome where there",
-        ),
-        (
-            {"hall_depth": 0.0, "hall_members": "front"},
-            "hall_members: must be pairs where there is no hall",
-        ),
-        (
-            {"hall_members": "front", "hall_memory": 3},
-            "hall_memory: must be null where fronts are copied",
-        ),
-        (
-            {"hall_distinct": "genomes"},
-            "'genome' or 'index', was 'genomes'; did you mean 'genome'?",
-        ),
-        (
-            {"hall_frozen": True, "hall_memory": 3},
-            "hall_memory: must be null where the hall is fro",
-        ),
+        ({"hall_depth": 0.0, "hall_distinct": "index"}, "hall_distinct: must be genome where"),
+        ({"hall_depth": 0.0, "hall_members": "front"}, "hall_members: must be pairs where there"),
+        ({"hall_members": "front", "hall_memory": 3}, "hall_memory: must be null where fronts are"),
+        ({"hall_distinct": "genomes"}, "'genome' or 'index', was 'genomes'; did you mean"),
+        ({"hall_frozen": True, "hall_memory": 3}, "hall_memory: must be null where the hall is"),
         ({"population_size": 0}, "population_size: must be at least 1, was 0"),
         ({"mutation_step": 0.0}, "mutation_step: must be greater than 0.0, was 0.0"),
         ({"hall_depth": 1.5}, "hall_depth: must be at most 1.0, was 1.5"),

@@ -110,10 +110,7 @@ def test_maps_in_space() -> None:
         (f"{FLOOR} {FLOOR_TREES} robot.dimensions=3", "robot: must be one that slides along"),
         (f"{FLOOR} {FLOOR_TREES} scenario.start=[7,9]", r"scenario\.start: must be a free node"),
         (f"{FLOOR} {FLOOR_TREES} robot.body_radius=5", "free of contact between bodies"),
-        (
-            f"robot=planar_7r scenario=curkovic_a {LINK_TREES}",
-            "robot: must be planar arms of two li",
-        ),
+        (f"robot=planar_7r scenario=curkovic_a {LINK_TREES}", "robot: must be planar arms of two"),
         (
             f"robot=two_links_05 scenario=curkovic_stationary {LINK_TREES}",
             r"stationary: must be empty: this planner moves all robots, was \[1\]",

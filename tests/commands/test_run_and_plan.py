@@ -12,7 +12,6 @@ import pytest
 from command_samples import SERIAL, Evoexp, content, exit_code
 
 from evoexp import load
-from evoexp.commands import plan
 from evoexp.commands.plan import OTHER_SETTINGS, bounds
 from evoexp.configuration import compose
 from evoexp.store.run_directory import RunDirectory
@@ -173,16 +172,6 @@ def test_times_come_from_other_runs_of_the_scene(evoexp: Evoexp, stored: Path) -
     known = json.loads(evoexp("plan", *PLANAR, "--json").out)
     for row, own in zip(rows, known, strict=True):
         assert row["cached"] == 0 and row["cpu_s_each"] > own["cpu_s_each"] > 0.0
-
-
-def test_every_stored_run_is_read_once_for_any_number_of_conditions(
-    evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    read: list[str] = []
-    table = plan.summary_table
-    monkeypatch.setattr(plan, "summary_table", lambda r: (read.append(r.hash12), table(r))[1])
-    assert len(json.loads(evoexp("plan", "-m", *PLANAR, "seed=range(1,9)", "--json").out)) == 24
-    assert sorted(read) == sorted(run.hash12 for run in find_runs(stored))
 
 
 @pytest.mark.parametrize(

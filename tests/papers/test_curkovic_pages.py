@@ -20,7 +20,7 @@ from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import FamilyComparison, compare, compare_families
+from evoexp.report.statistics.comparisons import FamilyComparison, compare_families
 from report_samples import can_be_drawn, page_settings, smoke_results
 
 RULES = read_page_file("evoexp.papers.curkovic").rules
@@ -201,27 +201,6 @@ def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     judged = compared_settings.of_sweep(judge, results, compared(results))
     readings = [claim.text.rsplit("; ", 1)[1] for claim in judged]
     assert readings == ["Eq. 9 as printed", "Eq. 9 read as symmetric"] * 3
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "verdict"),
-    [
-        (0.0, 20.0, judging.REPRODUCED),
-        (20.0, 0.0, judging.CONTRADICTED),
-        (0.0, 0.0, judging.UNDECIDED),
-    ],
-)
-def test_verdicts_follow_the_rows_of_a_sweep(
-    outputs: Path, first: float, second: float, verdict: str
-) -> None:
-    results, costs = smoke_results(outputs, "curkovic_mutation"), np.arange(12.0)
-    pair = costs + first, costs + second
-    rows = tuple(compare(f"constant {k}", *pair, True, 0.95) for k in range(3))
-    judge = judging.Judge("", page_settings("curkovic_mutation"), RULES)
-    family = compared(results)[0]._replace(rows=rows)
-    (judged,) = compared_settings.of_sweep(judge, results, [family])
-    assert judged.verdict == verdict
-    assert "constant 2 (A12" in judged.evidence
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:

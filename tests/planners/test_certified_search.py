@@ -152,14 +152,6 @@ def test_the_cheapest_free_strings_are_judged_until_one_is_proven(
     assert costs.tolist() == [np.inf, np.inf, np.inf, 9.0, np.inf, 5.0]
 
 
-def test_a_verdict_is_asked_for_once() -> None:
-    planner, problem = condition("rana_planar").prepare()
-    solution = planner.solution(problem, planner.sample(problem, np.random.default_rng(0), 1), 0)
-    proofs = Proofs(planner, problem)
-    assert proofs.is_proven(solution) == proofs.is_proven(solution.copy())
-    assert proofs.num_certificates == 1
-
-
 def test_a_refuted_team_counts_as_colliding_once_more() -> None:
     planner, problem = condition("curkovic_three").prepare()
     populations = planner.sample(problem, np.random.default_rng(1), 40)

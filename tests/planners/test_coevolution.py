@@ -10,9 +10,7 @@ from composed import composed
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
-from evoexp.planners.coevolution.generations import CACHED, PER_CALL, per_call
 from evoexp.planners.coevolution.planner import Coevolution, Problem
-from evoexp.records import generations
 from evoexp.report.results.stored_results import ConditionResults
 from matrix import num_cases
 from planners.runs import evolved, ran
@@ -126,34 +124,6 @@ def test_a_spline_is_executed_between_the_same_configurations() -> None:
         speed = np.abs(np.gradient(own, times, axis=0)).max()
         assert terms[fastest] == pytest.approx(speed, abs=0.05)
         assert plain[fastest] == pytest.approx(np.abs(np.diff(path, axis=0)).max())
-
-
-def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() -> None:
-    """Eq. 10 over 30 generations, with the decay that 30 of 200 have."""
-    (front, problem), method = composed("experiment=curkovic_pareto").prepare(), prepared()[0]
-    both = (generations(each.evolve(problem, np.random.default_rng(9))) for each in (front, method))
-    for one, other in zip(*both, strict=False):
-        assert np.array_equal(one.population, other.population)
-    assert one.index == 30
-    assert one.criteria is not None
-    assert one.criteria.shape == (2, 4, 100)
-    assert one.criteria.sum(axis=1) == pytest.approx(one.costs)
-    assert other.criteria is None
-
-
-def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
-    safety = condition("collision.tcp_radius=0.04", experiment="curkovic_safety", label="")
-    scene = safety.prepare().problem.scene
-    assert set(scene.names) == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}
-    assert [shape.radius for shape, _, _ in scene.shapes] == [0.02, 0.02, 0.04] * 2
-
-
-def test_large_populations_are_computed_generation_by_generation() -> None:
-    assert per_call(2, 100) == PER_CALL
-    assert per_call(2, 5000) == 1
-    for count in (1, 10, 150, 200, 1000):
-        length = per_call(2, count)
-        assert length == 1 or 2 * length * count * count <= CACHED
 
 
 def worsens(given: Condition, seed: Any) -> bool:

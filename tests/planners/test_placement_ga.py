@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
-from planners.runs import ran, verdict
+from planners.runs import verdict
 
 
 def condition(*words: str) -> Condition:
@@ -18,28 +17,6 @@ def condition(*words: str) -> Condition:
 
 def prepared(*words: str) -> Any:
     return condition(*words).prepare()
-
-
-@pytest.mark.parametrize(("coding", "last"), [("binary", 0xFFFF), ("gray", 0x8000)])
-def test_the_ends_of_the_range_are_values(coding: str, last: int) -> None:
-    planner, problem = prepared(f"planner.coding={coding}")
-    strings = np.array([[0, last], [0, 0]])
-    values = [planner.solution(problem, strings, k).tolist()[:2] for k in range(2)]
-    assert values == [[-180.0, -180.0], [180.0, -180.0]]
-
-
-def test_without_elitism_the_best_can_get_lost_and_with_it_never() -> None:
-    for elites, times in ((0, range(11, 1000)), (1, [0])):
-        records = ran(condition(f"ga.num_elites={elites}")).records
-        costs = np.array([record.best_cost_in_generation for record in records])
-        assert np.count_nonzero(np.diff(costs) > 0.0) in times
-
-
-def test_a_run_ends_near_the_optimum() -> None:
-    elitist = condition("ga=chen_placement_elitism")
-    costs = [run_replicate(elitist, k).summary.best_cost for k in range(20)]
-    assert min(costs) > 1.72761706
-    assert np.median(costs) < 1.76, "the median of 60 runs is 1.728"
 
 
 def test_postures_are_judged_by_their_bodies() -> None:

@@ -11,7 +11,7 @@ from composed import composed
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import standard_normal
-from evoexp.planners.baselines.real_vectors import real_vectors, transposed_root
+from evoexp.planners.baselines.real_vectors import real_vectors
 from evoexp.records import generations
 
 HAS_PYMOO = importlib.util.find_spec("pymoo") is not None
@@ -140,15 +140,6 @@ def test_objectives_are_names_of_terms() -> None:
         control("nsga2", "control.objectives=[length, colisions]").prepare()
     with pytest.raises(SettingError, match=r"control\.objectives: must be a list of at least 2"):
         control("nsga2", "control.objectives=[length]").prepare()
-
-
-def test_roots_are_those_of_linear_algebra() -> None:
-    rng = np.random.default_rng(4)
-    tall = rng.normal(size=(60, 30))
-    matrix = tall.T @ tall
-    root = transposed_root(matrix)
-    assert np.allclose(root.T, np.linalg.cholesky(matrix), rtol=0.0, atol=1e-9)
-    assert not np.tril(root, -1).any()
 
 
 def test_weights_of_infeasible_and_of_equal_costs() -> None:

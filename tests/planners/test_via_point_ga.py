@@ -53,26 +53,6 @@ def test_samples_of_a_string_are_its_segments_via_points_included() -> None:
     np.testing.assert_array_equal(sampled(strings, 4)[:, ::4], strings)
 
 
-def test_puma_like_arms_move_by_eq_10_and_their_straight_line_collides() -> None:
-    planner, problem = prepared(experiment="rana_puma")
-    q = np.array([20.0, 30.0, -40.0, -70.0, 10.0, 55.0])
-    centres = np.concatenate(problem.sphere_centres(q))
-    slices = problem.collision.arm_spheres
-    assert [stop - first for first, stop in slices] == [9, 9]  # none on the columns
-    for arm, (first, stop) in enumerate(slices):
-        one, two, three = np.deg2rad(q[3 * arm : 3 * arm + 3])
-
-        def link(tilt: float, turn: float = one) -> FloatArray:
-            flat = np.array([np.cos(turn), np.sin(turn), 0.0])
-            return np.cos(tilt) * flat + [0.0, 0.0, np.sin(tilt)]
-
-        shoulder, upper, lower = np.array([0.0, 2.5 * arm, 1.0]), link(two), link(two + three)
-        expected = [shoulder + share * upper for share in np.linspace(0.0, 1.0, 5)]
-        expected += [shoulder + upper + share * lower for share in np.linspace(0.25, 1.0, 4)]
-        assert centres[first:stop] == pytest.approx(np.array(expected), abs=1e-12)
-    assert planner.evaluate(problem, straight(problem, 40))["collisions"] == 3.0
-
-
 @pytest.mark.examples(5)
 @pytest.mark.parametrize(
     "words",

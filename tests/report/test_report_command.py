@@ -49,7 +49,7 @@ def test_runs_by_prefixes_of_their_hashes(capsys: pytest.CaptureFixture[str]) ->
 BOTH = "overrides: must be left out where runs are given by their hashes"
 
 
-@pytest.mark.examples(3)
+@pytest.mark.examples(4)
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -61,6 +61,8 @@ BOTH = "overrides: must be left out where runs are given by their hashes"
         (["rana_planar", "report.dpi=0"], "report.dpi: must be at least 1, was 0"),
         (["rana_planar", *SMALL, "report.figures=ranna"], "no option 'ranna'; did you mean 'rana'"),
         (["HASH", "budget=smoke"], BOTH),
+        (["rana_planar", "report.width=colum"], "must be one of 'page' or 'column', was 'colum'"),
+        (["rana_planar", "report.style=none.mplstyle"], "style: must be the path of a matplotlib"),
     ],
 )
 def test_what_cannot_be_reported_is_one_line(

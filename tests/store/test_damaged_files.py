@@ -274,14 +274,6 @@ def test_damage_is_named_and_a_damaged_run_hides_no_other(
         run.check()
 
 
-@pytest.mark.parametrize("content", ["", "{", '{"plans": 1}', '{"plans": [{"n": 1}]}'])
-def test_damaged_plans_are_set_aside(run: RunDirectory, content: str) -> None:
-    (run.path / "plans.json").write_text(content)
-    mended(run, "plans.json")
-    run.note_plan(3)
-    assert run.plans()[0].num_replicates == 3
-
-
 def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
     run.replicates.rmdir()
     run.replicates.touch()
@@ -289,15 +281,6 @@ def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
     mended(run, "replicates (damaged: not a directory")
     run.create(CONFIG, {})
     assert run.replicates.is_dir()
-
-
-def test_stray_files_are_no_logs(run: RunDirectory, add: Add) -> None:
-    add(1)
-    for name in ("00001.mcap", "1.mcap", "notes.txt", "0001.mcap.damaged", "١٢٣٤.mcap", "x.mcap"):
-        (run.replicates / name).write_bytes(b"")
-    (run.replicates / "folder").mkdir()
-    assert run.completed() == {1}
-    assert summary_table(run).num_rows == 1
 
 
 def test_an_interrupted_writer_leaves_no_temporary_file(

@@ -70,14 +70,6 @@ def test_plus_selection_may_have_more_parents_than_offspring() -> None:
     assert plus.num_parents == 103
 
 
-@pytest.mark.parametrize(
-    ("size", "depth", "teams"), [(100, 0.15, 15), (50, 0.15, 7), (150, 0.15, 22), (100, 0.0, 0)]
-)
-def test_depth_of_the_hall_is_rounded_down(size: int, depth: float, teams: int) -> None:
-    settings = built(population_size=size, hall_depth=depth, num_elites=2)
-    assert (settings.num_hall_teams, settings.num_offspring) == (teams, size - 2 - teams)
-
-
 @given(st.integers(1, 1000), st.integers(0, 100))
 def test_a_depth_in_percent_is_exact(size: int, percent: int) -> None:
     if percent == 0 or percent * size >= 100:
@@ -121,12 +113,3 @@ def test_refusals_of_co_evolution_name_the_field(changes: dict[str, Any], messag
         built(**changes)
     assert str(error.value).startswith("ga.")
     assert message in str(error.value)
-
-
-def test_schedule_of_eq_10() -> None:
-    rates = [built().mutation_rate_at(t) for t in (0, 100, 200)]
-    assert rates == pytest.approx([1.0, 0.55, 0.1], rel=1e-15)
-    constant = built(mutation_rate=0.3, mutation_decay=0.0)
-    assert [constant.mutation_rate_at(t) for t in (0, 77, 200)] == [0.3, 0.3, 0.3]
-    assert built(mutation_rate=0.3, mutation_decay=0.3).mutation_rate_at(300) == 0.0
-    assert built(num_generations=0).mutation_rate_at(0) == 1.0

@@ -8,7 +8,6 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
 from evoexp.planners.coevolution.planner import Coevolution, Problem
 from evoexp.report.results.stored_results import ConditionResults
@@ -63,32 +62,6 @@ def test_random_search_draws_teams_of_its_own() -> None:
     k = int(np.argmin(judged.cost))
     terms = planner.evaluate(problem, planner.solution(problem, population, k))
     assert terms["team_cost"] == pytest.approx(judged.cost[k], abs=1e-9)
-
-
-@pytest.mark.examples(3)
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("scenario.q_start=[{angles:[90.0,90.0]},{angles:[200.0,10.0]}]", "[1].angles[0]: must be"),
-        (
-            "scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",
-            "q_start: must be free of collision (robots 1 and 2 touch: arm_1_link_2 and arm",
-        ),
-        (
-            "scenario.q_goal=[{tip:[0.9,0.0],elbow:left},{angles:[30.0,120.0]}]",
-            "must be 0 to 0.5 awa",
-        ),
-        ("scenario.q_goal=[{tip:[0.4,0.0]},{angles:[30.0,120.0]}]", "elbow: must be given with"),
-        ("scenario.stationary=[0]", "q_goal[0]: must be the same as its start"),
-        ("ga.hall_depth=0.001", "hall_depth: must be 0, or large enough"),
-        ("planner.chromosome_length=7", "chromosome_length: must be even and at least 2"),
-        ("planner.chromosome_length=0", "chromosome_length: must be "),
-    ],
-)
-def test_what_cannot_be_is_refused(word: str, message: str) -> None:
-    with pytest.raises(SettingError) as refused:
-        prepared(word)
-    assert message in str(refused.value)
 
 
 def test_a_tip_is_reached_by_both_elbows() -> None:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.errors import SettingError
 from planners.runs import ran
 from references import rana_numpy
 
@@ -29,9 +28,3 @@ def test_generations_are_starts_and_sweeps_as_a_slow_version_makes_them(
         assert generation.costs == pytest.approx(expected.cost, abs=tolerance)
         assert generation.best_cost == pytest.approx(lowest, abs=tolerance)
         assert generation.num_feasible == np.count_nonzero(expected.collisions == 0)
-
-
-def test_a_planner_without_a_local_operator_is_refused() -> None:
-    must = "control: must be left out: redundant_ga has no local operator to be repeated"
-    with pytest.raises(SettingError, match=must):
-        composed("experiment=lavoie_7dof", "control=multi_start").prepare()

@@ -91,17 +91,6 @@ def test_immigrants_descend_from_the_nearest_member_and_their_steps_are_reported
     assert terms["longest_step_scopes"] == pytest.approx(steps.max())
 
 
-def test_edges_that_are_tested_are_free() -> None:
-    """The paper's own search touches the shelf between postures in a third of its runs."""
-    plain, tested = (
-        [log(words, k).summary for k in range(12)]
-        for words in (SHELF, f"{SHELF} planner.edge_check=4")
-    )
-    assert [summary.certified for summary in plain].count(False) >= 2
-    assert [summary.certified for summary in tested].count(False) == 0
-    assert tested[0].collision_queries == 1 + 5 * (tested[0].evaluations - 1)
-
-
 class Carried(NamedTuple):
     """A replicate of pick-and-place that succeeds."""
 

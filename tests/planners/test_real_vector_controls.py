@@ -168,11 +168,3 @@ def test_runs_depend_on_their_seed_alone_and_costs_fall(name: str) -> None:
     assert one[-1].best_cost != other[-1].best_cost
     assert one[-1].best_cost < 0.8 * one[0].best_cost
     assert chosen.reproducibility == ("bits" if name == "stomp" else "environment")
-
-
-@pytest.mark.parametrize("name", CONTROLS)
-@pytest.mark.parametrize("experiment", ["curkovic_motion", "lavoie_7dof", "corsepius_ball"])
-def test_planners_of_other_codings_are_refused(name: str, experiment: str) -> None:
-    must = "control: must be left out: individuals of .* are no vectors of real numbers"
-    with pytest.raises(SettingError, match=must):
-        control(name, experiment=experiment).prepare()

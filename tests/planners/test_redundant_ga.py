@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.errors import SettingError
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
@@ -86,29 +85,3 @@ def test_a_population_without_one_feasible_member_is_searched_on() -> None:
     assert last.index == 3 * (1 + 9) - 1
     assert planner.evaluate(problem, last.best)["of_sp1"] < 60.0, "the best posture A"
     assert np.array_equal(last.best[7:14], last.best[14:]), "where the arm stays"
-
-
-@pytest.mark.examples(4)
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("scenario=lavoie_10dof_literal robot=planar_10r", "q_start: must be free of collision"),
-        ("scenario.q_start=[1.8,1.0]", "scenario.q_start: must be one angle per joint (7), was 2"),
-        (
-            "scenario.q_start=[2.2,1,-1,-1,0,0,0]",
-            "q_start[0]: must be within the joint's limits, 0",
-        ),
-        ("scenario.box_x=[5,5]", "box_x: must be [least, greatest]"),
-        ("robot.joint_limits=null", "robot.joint_limits: must be given"),
-        ("robot.joint_limits=[[0,1]]", "joint_limits: must be one pair per link (7), was 1"),
-        ("robot=two_planar_2r", "robot: must be one planar arm in the plane z = 0"),
-        ("ga=rana_planar", "ga: must be a SelectiveSettings"),
-        ("scenario=rana_planar", "scenario: must be one that redundant_ga takes (PickAndPlace),"),
-        ("planner.success=maybe", "success: must be one of 'threshold' or 'finite', was 'maybe'"),
-        ("collision.num_positions=0", "collision.num_positions: must be at least 1, was 0"),
-    ],
-)
-def test_what_cannot_be_is_refused(words: str, message: str) -> None:
-    with pytest.raises(SettingError) as caught:
-        prepared(*words.split())
-    assert message in str(caught.value)

@@ -77,8 +77,6 @@ def test_a_search_may_end_without_a_plan() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(SettingError, match=r"scenario\.goal_point: must be in the box"):
-        condition("scenario.goal_point=[5,5]").prepare()
     planner: Any
     planner, problem = condition().prepare()
     with pytest.raises(SettingError, match="one that draws paths one by one"):

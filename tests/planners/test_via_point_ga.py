@@ -8,7 +8,6 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa, sampled
 from evoexp.records import FloatArray, generations
@@ -78,26 +77,6 @@ def test_degenerate_settings_run(words: str) -> None:
     for generation in generations(planner.evolve(problem, np.random.default_rng(0))):
         assert np.isfinite(generation.costs).all()
         assert np.isfinite(generation.population).all()
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("scenario.q_start=[[90,0],[270,0]]", "q_start: must be free of collision (two arms overl"),
-        ("scenario.q_goal=[[90,0],[270,0]]", "scenario.q_goal: must be free of collision"),
-        ("scenario.q_start=[[45,225]]", "q_start: must be one list per arm of the robot"),
-        ("scenario.q_start=[[45,225],[1,2,3]]", "q_start: must be one list per arm of the robot"),
-        ("planner.num_new_trajectories=49", "num_new_trajectories: must be at most the offspring"),
-        (
-            "scenario.obstacles=[{shape: sphere, center: [2.8, 2.8], radius: 0.5}]",
-            "an arm and an obstacle overlap",
-        ),
-    ],
-)
-def test_problems_that_cannot_be_are_refused(word: str, message: str) -> None:
-    with pytest.raises(SettingError) as caught:
-        prepared(word)
-    assert message in str(caught.value)
 
 
 def test_arms_and_obstacles_have_margins_of_their_own() -> None:

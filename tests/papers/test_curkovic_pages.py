@@ -134,20 +134,6 @@ def test_the_lines_of_tools_are_further_apart_than_their_bodies(outputs: Path) -
     assert (link_motions.tool_distance(condition) >= condition.column("clearance")).all()
 
 
-@pytest.mark.matrix
-def test_headline_claims_are_judged_under_every_variation(outputs: Path) -> None:
-    found = page(outputs, "curkovic_claims")
-    effects, assumed = found.tables
-    conditions = [row[0] for row in effects.rows]
-    assert conditions[0] == "V" and all(label.startswith("V") for label in conditions)
-    assert len(conditions) == 14  # without both numbers of generations, which are capped
-    judged = [claim.name for claim in found.claims]
-    assert judged == ["faster", "hall_beyond_elites", "free_motion"]
-    varied = {row[0]: row[4] for row in assumed.rows}
-    assert varied["`ga.population_size`"] == "V, 50 individuals; V, 200 individuals"
-    assert not any("nothing to compare" in claim.evidence for claim in found.claims)
-
-
 def changed(own: ConditionResults, costs: np.ndarray, refuted: np.ndarray) -> ConditionResults:
     """Return stored runs with other costs and verdicts."""
     verdict = pd.array(~refuted, dtype="boolean")

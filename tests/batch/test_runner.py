@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evoexp.batch.warm_kernels as warm_kernels_module
-from evoexp.batch import jobs, live_curves
+from evoexp.batch import live_curves
 from evoexp.batch.fan_out import MAX_BUNDLE, Replicates
-from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
+from evoexp.batch.jobs import NO_LIMITS, Job, Outcome
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate_limits import ReplicateLimits
-from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
+from evoexp.batch.warm_kernels import warm_kernels
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import DamagedStore
@@ -228,26 +228,6 @@ def test_every_job_is_run_once_and_in_order(
         seen += bundle[:done]  # the worker stopped there
         replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
     assert seen == waiting
-
-
-def test_a_task_that_takes_long_begins_no_further_replicate(
-    faulty: Condition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(jobs, "LONGEST_TASK_S", 0.0)
-    outcomes = run_jobs([job(faulty, k) for k in range(3)])
-    assert [outcome.replicate for outcome in outcomes] == [0]
-
-
-def test_conditions_that_differ_in_numbers_are_one_kind(
-    faulty: Condition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    searched, planner = [], type(faulty.planner)
-    evolve = planner.evolve
-    monkeypatch.setattr(planner, "evolve", lambda *a: (searched.append(a), evolve(*a))[1])
-    others = [faulty._replace(seed=seed) for seed in range(1, 4)]
-    kinds = one_of_each_kind(job(each, index) for each in [faulty, *others] for index in range(3))
-    warm_kernels(kinds, ReplicateLimits())
-    assert len(kinds) == len(searched) == 1
 
 
 @pytest.mark.parametrize("fault", ["raise:0", "slow:0"])

@@ -181,7 +181,7 @@ NO_LIST = "experiment: must be a file of settings whose 'defaults' are a list"
         (f"{WHOLE}conditions: 3\n", "conditions: must be a mapping of labels"),
         (f"{ENTRY}3", "conditions.a: must be a list of overrides, was 3"),
         (f"{ENTRY}[3]", "conditions.a: must be a list of overrides, was [3]"),
-        (f"{ENTRY}{{reading: {{b: []}}}}", "conditions.a.reading: unknown setting"),
+        (f"{ENTRY}{{reading: {{b: []}}}}", "conditions.a.reading"),
         (f"{ENTRY}{{readings: [seed=1]}}", "conditions.a.readings: must be"),
         (f"{ENTRY}{{readings: {{b: seed=1}}}}", "conditions.a: must be"),
         (f'{ENTRY}[]\n  "{{}}": ["seed=1"]', "must be a label with one {} per swept override"),

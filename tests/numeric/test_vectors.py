@@ -12,17 +12,13 @@ from evoexp.numeric.compilation import copy_part, kernel
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
 from evoexp.numeric.vector_rows import (
-    lane_numbers,
     load_each,
     load_pairs,
     load_quads,
     num_up_to,
-    store_places,
-    transposed,
 )
 from evoexp.numeric.vectors import (
     LANES,
-    any_lane,
     ceiling,
     load,
     lower,
@@ -119,19 +115,6 @@ def test_comparisons_hold_as_those_of_scalars(comparison: Function) -> None:
     assert same(over_lanes(lambda a, b: flag(comparison(a, 0.0)))(), comparison(X, 0.0))
 
 
-def test_a_condition_holds_in_any_lane() -> None:
-    @kernel
-    def any_below(x: FloatArray, limit: float, asked: bool) -> bool:
-        return any_lane((load(x, U(0)) < limit) & asked)
-
-    for lane in range(LANES):
-        x = np.ones(LANES)
-        x[lane] = -1.0
-        assert any_below(x, 0.0, True)
-        assert not any_below(x, -1.0, True) and not any_below(x, 0.0, False)
-    assert not any_below(np.full(LANES, np.nan), np.inf, True)
-
-
 def test_neighbours_are_read_and_written_where_they_are_named() -> None:
     @kernel
     def shift(x: FloatArray, place: int, out: FloatArray, to: int) -> None:
@@ -207,20 +190,6 @@ def quads(array: FloatArray, places: Any, at: int, offset: int) -> Any:
     return load_quads(array, places, U(at), U(offset))
 
 
-def test_a_square_is_transposed() -> None:
-    @kernel
-    def transpose(square: FloatArray, out: FloatArray) -> None:
-        low = load(square, U(0)), load(square, U(8)), load(square, U(16)), load(square, U(24))
-        high = load(square, U(32)), load(square, U(40)), load(square, U(48)), load(square, U(56))
-        rows = transposed(low + high)
-        for k in range(LANES):
-            store(out, U(k * LANES), rows[k])
-
-    square, out = np.random.default_rng(0).random((LANES, LANES)), np.empty(LANES * LANES)
-    transpose(square.ravel(), out)
-    assert np.array_equal(out.reshape(LANES, LANES), square.T)
-
-
 @pytest.mark.parametrize(("read", "width"), [(each, 1), (pairs, 2), (quads, 4)])
 def test_columns_are_read_from_each_lanes_own_place(read: Any, width: int) -> None:
     @kernel
@@ -253,16 +222,6 @@ def test_numbers_up_to_a_limit_are_counted() -> None:
         count(array, places, limits, out)
         for lane, begin in enumerate(places.astype(int) + 10):
             assert out[lane] == np.count_nonzero(array[begin + 1 : begin + 8] <= limits[lane])
-
-
-def test_whole_numbers_become_places() -> None:
-    @kernel
-    def as_places(numbers: FloatArray, out: Any) -> None:
-        store_places(out, U(3), load(numbers, U(0)) + lane_numbers())
-
-    numbers, out = np.array([0.0, 1.0, 5.0, 2.0**40, 7.0, 0.0, 3.0, 2.0]), np.zeros(12, np.uint64)
-    as_places(numbers, out)
-    assert list(out) == [0, 0, 0, *(numbers + np.arange(8)).astype(int), 0]
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.int32, np.int64, np.float64])

@@ -109,21 +109,6 @@ def test_nothing_that_was_set_aside_is_overwritten(tmp_path: Path) -> None:
     assert not any(map(is_set_aside, ("0001.mcap", ".damaged", "0001.mcap.damaged.tmp")))
 
 
-def test_damage_that_keeps_size_and_time_is_seen_by_who_reads_the_logs(
-    run: RunDirectory, add: Add
-) -> None:
-    for replicate in (0, 1):
-        add(replicate)
-    assert summary_table(run).num_rows == 2
-    status = run.log_path(1).stat()
-    flip(run.log_path(1))
-    os.utime(run.log_path(1), ns=(status.st_atime_ns, status.st_mtime_ns))
-    assert summary_table(run).num_rows == 2
-    with pytest.warns(DamagedStore, match="0001.mcap .altered"):
-        assert summary_table(run, thorough=True).num_rows == 1
-    assert whole_logs(run) == {0}, "and by everybody from then on"
-
-
 def test_a_log_of_another_version_is_left_out_and_left_alone(
     run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,7 +15,7 @@ LINES: dict[str, dict[str, str]] = yaml.safe_load(
 )
 
 
-@pytest.mark.examples(25)
+@pytest.mark.examples(40)
 @pytest.mark.parametrize(
     ("condition", "words", "message"),
     [(condition, *line) for condition, lines in LINES.items() for line in lines.items()],

@@ -213,13 +213,3 @@ def test_blocks_give_the_log_of_their_generations(most: int, name: str) -> None:
         assert finished(in_blocks(given, most)).content == expected
         rows = read_log(expected).generations
         assert [row.terms[name] for row in rows] == [float(each.index) for each in given]
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.int32, np.int64])
-def test_costs_of_other_types_are_the_same_in_blocks(kind: type) -> None:
-    written = [
-        each._replace(costs=np.arange(20).astype(kind) + kind(each.index))
-        for each in generations(30)
-    ]
-    one, two = finished(map(Block.of, written)), finished(in_blocks(written, 9))
-    assert one.summary.digest == two.summary.digest

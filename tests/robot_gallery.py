@@ -4,9 +4,11 @@ Used by the test of all of them and by `scripts/update-gallery`, which writes th
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import yaml
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
@@ -54,58 +56,9 @@ class GalleryRobot(NamedTuple):
         return (*found, *([f"robot.tool_frame={self.tool}"] if self.tool else ()))
 
 
-def _numbered(pattern: str, count: int) -> tuple[str, ...]:
-    return tuple(pattern.format(k) for k in range(1, count + 1))
-
-
-def _named(pattern: str, words: str) -> tuple[str, ...]:
-    return tuple(pattern.format(word) for word in words.split())
-
-
-def _data(name: str, kind: str) -> str:
-    return f"{name}_description/{kind}/{name}.{kind}"
-
-
-_KINOVA, _Z1 = _numbered("j2s6s200_joint_{}", 6), _numbered("joint{}", 6)
-_TIAGO, _LEFT = _numbered("arm_{}_joint", 7), _numbered("arm_left_{}_joint", 7)
-_TIAGO_URDF = "tiago_description/robots/tiago"
-_TALOS, _TALOS_TOOL = "talos_data/robots/talos", "gripper_left_fingertip_1_link"
-_SHOULDER = "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_roll wrist_pitch wrist_yaw"
-_G1, _G1_URDF = _named("left_{}_joint", _SHOULDER), "g1_description/urdf/g1_29dof"
-_PAN = "shoulder_pan shoulder_lift upper_arm_roll elbow_flex forearm_roll wrist_flex wrist_roll"
-_PR2 = _named("l_{}_joint", _PAN)
-_SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
-_ROMEO = _named("L{}", "ShoulderPitch ShoulderYaw ElbowRoll ElbowYaw WristRoll WristYaw WristPitch")
-_BAXTER, _PANDA = _named("left_{}", "s0 s1 e0 e1 w0 w1 w2"), _numbered("panda_joint{}", 7)
 ROBOTS = tuple(
-    GalleryRobot(*row)
-    for row in (
-        ("UR3", "ur_description/urdf/ur3_robot.urdf"),
-        ("UR3 with gripper", "ur_description/urdf/ur3_gripper.urdf"),
-        ("UR5", "ur_description/urdf/ur5_robot.urdf"),
-        ("UR5 with gripper", "ur_description/urdf/ur5_gripper.urdf"),
-        ("UR10", "ur_description/urdf/ur10_robot.urdf"),
-        ("Panda", "panda_description/urdf/panda.urdf", _PANDA, "panda_hand", 0.12),
-        ("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
-        ("ANYmal with Kinova", "anymal_b_simple_description/robots/anymal-kinova.urdf", _KINOVA),
-        ("xArm 7", "xarm_description/urdf/xarm7.urdf"),
-        ("Unitree Z1", "z1_description/urdf/z1.urdf", _Z1),
-        ("Unitree B1 with Z1", "b1_description/urdf/b1-z1.urdf", _Z1),
-        ("Unitree G1", f"{_G1_URDF}_rev_1_0.urdf", _G1, "", 0.04),
-        ("Unitree G1 with hands", f"{_G1_URDF}_with_hand_rev_1_0.urdf", _G1, "", 0.04),
-        ("SO-100", "so_arm_description/urdf/so100.urdf", (), "", 0.03),
-        ("SO-101", "so_arm_description/urdf/so101.urdf", _SO101, "", 0.03),
-        ("Talos arm", f"{_TALOS}_left_arm.urdf", (), _TALOS_TOOL, 0.08),
-        ("Talos", f"{_TALOS}_reduced.urdf", _LEFT, _TALOS_TOOL, 0.08, "talos_data/srdf/talos.srdf"),
-        ("Tiago", f"{_TIAGO_URDF}.urdf", _TIAGO),
-        ("Tiago without hand", f"{_TIAGO_URDF}_no_hand.urdf", _TIAGO),
-        ("Tiago with two arms", f"{_TIAGO_URDF}_dual.urdf", _LEFT),
-        ("Tiago Pro", "tiago_pro_description/robots/tiago_pro.urdf", _LEFT),
-        ("Baxter", "baxter_description/urdf/baxter.urdf", _BAXTER),
-        ("PR2", _data("pr2", "urdf"), _PR2, "", 0.06, _data("pr2", "srdf")),
-        ("Romeo", _data("romeo", "urdf"), _ROMEO, "", 0.04, _data("romeo", "srdf")),
-        ("Centauro", "centauro_description/urdf/centauro.urdf", _numbered("j_arm1_{}", 6)),
-    )
+    GalleryRobot(**row | {"joints": tuple(row.get("joints", ()))})
+    for row in yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text())
 )
 
 

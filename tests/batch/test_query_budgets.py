@@ -51,12 +51,6 @@ def test_caps_are_whole_numbers_as_one_types_them() -> None:
     assert condition("budget.collision_queries=null").id == condition().id
 
 
-@pytest.mark.parametrize("text", ["0", "-5", "1.5", "x", "true", "1e300"])
-def test_other_caps_are_refused(text: str) -> None:
-    with pytest.raises(SettingError, match=r"budget\.collision_queries: must be"):
-        condition(f"budget.collision_queries={text}")
-
-
 @pytest.mark.parametrize("wrong", [b"0", b"true", b'"7"', b"7.0"])
 def test_a_stored_cap_is_checked(wrong: bytes) -> None:
     text, name = condition("budget.collision_queries=7").to_json(), b'"max_collision_queries":'

@@ -1,7 +1,6 @@
 """A batch runs what is missing, keeps what is there, and survives what fails."""
 
 import json
-import math
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -14,18 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evoexp.batch.jobs as jobs_module
-from evoexp.batch import jobs, live_curves
-from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates
+from evoexp.batch import live_curves
+from evoexp.batch.fan_out import MAX_BUNDLE, Replicates
 from evoexp.batch.jobs import (
     NO_LIMITS,
     Job,
     Outcome,
-    one_of_each_kind,
-    run_jobs,
     warm_kernels,
 )
 from evoexp.batch.live_curves import read_curves
-from evoexp.batch.replicate import run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.cli import main
 from evoexp.condition import Condition
@@ -109,20 +105,6 @@ def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     batch = new_batch(tmp_path, (faulty, 10))
     assert [job.replicate for job in batch.jobs] == [0, 5, 7, 8, 9]
     assert not batch.is_damaged
-
-
-def test_a_condition_is_built_once_per_process(
-    faulty: Condition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)  # kernels may have to be compiled
-    own = faulty._replace(seed=97)  # which no test has run before
-    build, calls = Condition.from_config, []
-    monkeypatch.setattr(Condition, "from_config", lambda given: calls.append(given) or build(given))
-    outcomes = run_jobs([job(own, k) for k in range(3)])
-    assert failures(outcomes) == {}
-    assert len(calls) == 1
-    again = run_replicate(own, 2).content
-    assert read_log(outcomes[2].content).content_digest == read_log(again).content_digest
 
 
 def test_a_batch_tells_how_its_replicates_converge(
@@ -250,43 +232,6 @@ def test_every_job_is_run_once_and_in_order(
         seen += bundle[:done]  # the worker stopped there
         replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
     assert seen == waiting
-
-
-def test_bundles_are_as_long_as_a_task() -> None:
-    waiting = [Job("0" * 64, b"", k) for k in range(1000)]
-    replicates = Replicates(waiting, 2, NO_LIMITS)
-    bundles = (task[0] for task in iter(lambda: replicates.next_task(0), None))
-    first = next(bundles)
-    assert len(first) == MAX_BUNDLE, "nothing is known yet"
-    replicates.end_task((first,), outcomes_of(first[:3], TASK_S / 10))
-    second = next(bundles)
-    assert second == waiting[3:13]
-    replicates.end_task((second,), outcomes_of(second, 1.0))
-    assert len(next(bundles)) == 1
-    for _ in range(60):
-        bundle = next(bundles)
-        replicates.end_task((bundle,), outcomes_of(bundle, TASK_S / 10))
-    assert len(next(bundles)) in (9, 10), "slow ones are forgotten"
-
-
-def test_a_task_that_takes_long_begins_no_further_replicate(
-    faulty: Condition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(jobs, "LONGEST_TASK_S", 0.0)
-    outcomes = run_jobs([job(faulty, k) for k in range(3)])
-    assert [outcome.replicate for outcome in outcomes] == [0]
-
-
-def test_conditions_that_differ_in_numbers_are_one_kind(
-    faulty: Condition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    searched, planner = [], type(faulty.planner)
-    evolve = planner.evolve
-    monkeypatch.setattr(planner, "evolve", lambda *a: (searched.append(a), evolve(*a))[1])
-    others = [faulty._replace(seed=seed) for seed in range(1, 4)]
-    kinds = one_of_each_kind(job(each, index) for each in [faulty, *others] for index in range(3))
-    warm_kernels(kinds, ReplicateLimits())
-    assert len(kinds) == len(searched) == 1
 
 
 @pytest.mark.parametrize("fault", ["raise:0", "slow:0"])

@@ -14,7 +14,7 @@ from process_table import PATIENCE_S, are_gone, processes
 
 from evoexp.batch import workers as workers_module
 from evoexp.batch.workers import DIED_TWICE, WorkerError, Workers, in_order
-from worker_tasks import end, end_once, fork_and_die, loaded_packages, refuse
+from worker_tasks import end, end_once, fork_and_die, refuse
 
 
 def test_results_come_in_order_and_each_task_is_done_once() -> None:
@@ -32,12 +32,6 @@ def test_workers_have_one_thread_per_library_whoever_started_them() -> None:
     with Workers(2) as workers:
         assert list(in_order(workers, os.getenv, ((name,) for name in names))) == ["1", "1"]
     assert [os.environ.get(name) for name in names] == before
-
-
-def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
-    with Workers(1) as workers:
-        (names,) = in_order(workers, loaded_packages, [()])
-    assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & names
 
 
 def test_an_error_of_a_task_is_raised_with_its_text() -> None:

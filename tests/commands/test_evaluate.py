@@ -118,18 +118,6 @@ def test_a_condition_of_another_shape_is_left_out(
     assert said.code == 2 and said.err.endswith(f"motion.json: {must}")
 
 
-def test_parts_of_different_shapes() -> None:
-    shape = ((3, 2), (3, 3))
-    values: list[Any] = [[[1, 2], [3, 4], [5, 6]], [[1, 2, 3]] * 3]
-    flat = flatten(values, shape)
-    assert flat is not None
-    assert flat.tolist() == [1, 2, 3, 4, 5, 6, 1, 2, 3, 1, 2, 3, 1, 2, 3]
-    for other in (values[::-1], values[:1], [[[1, 2], [3]], values[1]], [3, 4]):
-        assert flatten(other, shape) is None
-    for empty in ((..., (6,)), ((2, 2),)):
-        assert flatten([], empty) is None
-
-
 @pytest.mark.parametrize("shape", [(..., (3,)), ((2, 3), (6,)), ((), *[(11,)]), ((4, 3),)])
 def test_any_number_of_parts_are_nested_and_flattened(shape: tuple[Any, ...]) -> None:
     assert np.array_equal(flatten(nested(np.arange(12.0), shape), shape), np.arange(12.0))

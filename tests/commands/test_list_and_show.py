@@ -236,6 +236,8 @@ def test_show_says_what_the_chromosomes_length_violates(evoexp: Evoexp) -> None:
         "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.19 times over",
     ):
         assert line in out
+    long = ("--only", "V", "planner.chromosome_length=42")
+    assert "is within it" in evoexp("show", "experiment=curkovic_methods", *long).out
 
 
 def cells(out: str) -> dict[str, list[str]]:

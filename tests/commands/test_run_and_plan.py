@@ -12,8 +12,6 @@ import pytest
 from command_samples import SERIAL, Evoexp, content, exit_code
 
 from evoexp import load
-from evoexp.commands import plan
-from evoexp.commands.plan import OTHER_SETTINGS, bounds
 from evoexp.configuration import compose
 from evoexp.store.run_directory import RunDirectory
 from store_lookup import find_runs
@@ -173,33 +171,6 @@ def test_times_come_from_other_runs_of_the_scene(evoexp: Evoexp, stored: Path) -
     known = json.loads(evoexp("plan", *PLANAR, "--json").out)
     for row, own in zip(rows, known, strict=True):
         assert row["cached"] == 0 and row["cpu_s_each"] > own["cpu_s_each"] > 0.0
-
-
-def test_every_stored_run_is_read_once_for_any_number_of_conditions(
-    evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    read: list[str] = []
-    table = plan.summary_table
-    monkeypatch.setattr(plan, "summary_table", lambda r: (read.append(r.hash12), table(r))[1])
-    assert len(json.loads(evoexp("plan", "-m", *PLANAR, "seed=range(1,9)", "--json").out)) == 24
-    assert sorted(read) == sorted(run.hash12 for run in find_runs(stored))
-
-
-@pytest.mark.parametrize(
-    ("stored", "wanted", "least", "most"),  # stored: number of evaluations → seconds
-    [
-        ({100: 1.0}, 100, 1.0, 1.0),
-        ({100: 1.0}, 1000, 1.0, 10.0),  # a part of the time is the same for any number
-        ({100: 1.0}, 10, 0.1, 1.0),
-        ({100: 1.0, 1000: 5.0}, 1000, 5.0, 5.0),  # the nearest number of evaluations
-        ({100: 1.0, 1000: 5.0}, 2000, 5.0, 10.0),
-    ],
-)
-def test_a_guess_is_a_range(
-    stored: dict[int, float], wanted: int, least: float, most: float
-) -> None:
-    found = bounds([[(seconds, count)] for count, seconds in stored.items()], wanted)
-    assert found == pytest.approx((least / OTHER_SETTINGS, most * OTHER_SETTINGS))
 
 
 def test_nothing_is_known_where_nothing_is_stored(evoexp: Evoexp, outputs: Path) -> None:

@@ -14,7 +14,6 @@ import pytest
 from confinement import confined
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.configuration.refusals import check_file
 from evoexp.configuration.search_path import searched_first
 from evoexp.errors import EvoexpError
 from hostile_data import at, mutated, refusal
@@ -139,16 +138,6 @@ def test_an_option_that_harms_is_refused(
     found = confined(lambda: refusal(lambda: expand_mine(tmp_path)), tmp_path, 500)
     assert reason in found and "hush" not in found
     assert not (tmp_path / "harm").exists()
-
-
-def test_an_alias_counts_as_what_it_names_alone(tmp_path: Path) -> None:
-    path = tmp_path / "mine.yaml"
-    many = f"x: [{', '.join('1' * 20_000)}]\n"
-    path.write_text(f"{many}a: &a [1, 2]\nb: [*a, *a, *a, *a, *a]\n")
-    check_file(path)
-    path.write_text(f"a: &a [{', '.join('1' * 20_000)}]\nb: [*a, *a, *a, *a, *a]\n")
-    with pytest.raises(EvoexpError, match="at most 100,000 values, aliases unfolded"):
-        check_file(path)
 
 
 def test_nothing_of_the_environment_enters_by_an_override(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,17 +3,12 @@
 import math
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
-from evoexp.errors import SettingError
-from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.posture_es.cycles import StrategySettings
-from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
-from evoexp.validation import Component, build
+from evoexp.validation import build
 
 SHARED = {
     "population_size": 50, "num_generations": 500, "num_elites": 2, "crossover_rate": 0.9,
@@ -24,12 +19,6 @@ METHOD_V = SHARED | {
     "mutation_direction": "one_sided", "selection": "inverse", "num_elites": 0, "hall_depth": 0.15,
     "hall_memory": None, "hall_frozen": False, "restart_after": None,
 }  # fmt: skip
-SELECTIVE = SHARED | {"selection": "tournament", "tournament_size": 2, "rank_pressure": 1.5}
-REAL = SELECTIVE | {
-    "crossover": "one_point", "blend_alpha": 0.5, "mutation": "non_uniform",
-    "mutation_scope": "gene", "mutation_power": 2, "mutation_std": 0.1,
-}  # fmt: skip
-BINARY = SELECTIVE | {"bits_per_gene": 16}
 STRATEGY = {
     "num_parents": 5, "num_offspring": 100, "initial_size": 50, "num_immigrants": 2,
     "num_generations": 10, "patience": 15, "selection": "comma", "mutation": "uniform",
@@ -44,38 +33,9 @@ def built(**changes: Any) -> CoevolutionSettings:
     return settings
 
 
-@pytest.mark.parametrize(
-    ("kind", "settings", "message"),
-    [
-        (GeneticSettings, SHARED | {"num_elites": 51}, r"num_elites: must be at most .* \(50\)"),
-        (StrategySettings, STRATEGY | {"num_parents": 103}, r"\(100\) with comma selection"),
-        *((RealGenetic, REAL | {field: value}, field) for field, value in (
-            ("blend_alpha", -0.1), ("tournament_size", 0), ("rank_pressure", 0.9),
-            ("rank_pressure", 2.1), ("mutation_power", -1), ("mutation_std", 0.0),
-            ("selection", "lottery"), ("crossover", "two_point"), ("mutation", "none"),
-            ("mutation_scope", "all"),
-        )),
-        *((BinaryGenetic, BINARY | {"bits_per_gene": bits}, "bits_per_gene") for bits in (0, 53)),
-    ],
-)  # fmt: skip
-def test_settings_out_of_range_are_refused(
-    kind: type[Component], settings: dict[str, Any], message: str
-) -> None:
-    with pytest.raises((SettingError, ValidationError), match=message):
-        kind(**settings)
-
-
 def test_plus_selection_may_have_more_parents_than_offspring() -> None:
     plus = StrategySettings(**STRATEGY | {"num_parents": 103, "selection": "plus"})
     assert plus.num_parents == 103
-
-
-@pytest.mark.parametrize(
-    ("size", "depth", "teams"), [(100, 0.15, 15), (50, 0.15, 7), (150, 0.15, 22), (100, 0.0, 0)]
-)
-def test_depth_of_the_hall_is_rounded_down(size: int, depth: float, teams: int) -> None:
-    settings = built(population_size=size, hall_depth=depth, num_elites=2)
-    assert (settings.num_hall_teams, settings.num_offspring) == (teams, size - 2 - teams)
 
 
 @given(st.integers(1, 1000), st.integers(0, 100))
@@ -89,59 +49,3 @@ def test_distinct_genomes_are_the_default_and_no_part_of_the_canonical_form() ->
     assert built() == built(hall_distinct="genome")
     assert "hall_distinct" not in built().canonical()
     assert built(hall_distinct="index").canonical()["hall_distinct"] == "index"
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"num_elites": 86},
-            "num_elites: must be at most population_size less the hall's teams (85)",
-        ),
-        ({"mutation_rate": 0.5}, "mutation_decay: must be at most mutation_rate (0.5), was 0.9"),
-        ({"hall_depth": 0.009}, "hall_depth: must be 0, or large enough for one pair"),
-        ({"hall_depth": 0.0, "hall_memory": 3}, "hall_memory: must be null where there is no hall"),
-        ({"hall_depth": 0.0, "hall_frozen": True}, "hall_frozen: must be false where there is no"),
-        (
-            {"hall_depth": 0.0, "hall_distinct": "index"},
-            "hall_distinct: must be genome where there",
-        ),
-        (
-            {"hall_depth": 0.0, "hall_members": "front"},
-            "hall_members: must be pairs where there is no hall",
-        ),
-        (
-            {"hall_members": "front", "hall_memory": 3},
-            "hall_memory: must be null where fronts are copied",
-        ),
-        (
-            {"hall_distinct": "genomes"},
-            "'genome' or 'index', was 'genomes'; did you mean 'genome'?",
-        ),
-        (
-            {"hall_frozen": True, "hall_memory": 3},
-            "hall_memory: must be null where the hall is fro",
-        ),
-        ({"population_size": 0}, "population_size: must be at least 1, was 0"),
-        ({"mutation_step": 0.0}, "mutation_step: must be greater than 0.0, was 0.0"),
-        ({"hall_depth": 1.5}, "hall_depth: must be at most 1.0, was 1.5"),
-        ({"hall_memory": 0}, "hall_memory: must be at least 1, was 0"),
-        ({"restart_after": 0}, "restart_after: must be at least 1, was 0"),
-        ({"selection": "inverses"}, "selection: must be one of 'inverse' or 'difference'"),
-        ({"hall_frozen": 1}, "hall_frozen: must be true or false, was 1"),
-    ],
-)
-def test_refusals_of_co_evolution_name_the_field(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(SettingError) as error:
-        built(**changes)
-    assert str(error.value).startswith("ga.")
-    assert message in str(error.value)
-
-
-def test_schedule_of_eq_10() -> None:
-    rates = [built().mutation_rate_at(t) for t in (0, 100, 200)]
-    assert rates == pytest.approx([1.0, 0.55, 0.1], rel=1e-15)
-    constant = built(mutation_rate=0.3, mutation_decay=0.0)
-    assert [constant.mutation_rate_at(t) for t in (0, 77, 200)] == [0.3, 0.3, 0.3]
-    assert built(mutation_rate=0.3, mutation_decay=0.3).mutation_rate_at(300) == 0.0
-    assert built(num_generations=0).mutation_rate_at(0) == 1.0

@@ -15,12 +15,11 @@ from evoexp.evolution.operators.selection import (
     Tournament,
     spin_roulette,
 )
-from evoexp.evolution.scaled_selection import choose_by_remainders, scale_costs
+from evoexp.evolution.scaled_selection import scale_costs
 
 INF, NAN = np.inf, np.nan
 COUNT = 40_000
 FITNESS = FitnessRoulette(fitness_offset=4.0)
-COSTS = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=30).map(np.array)
 
 
 @pytest.mark.parametrize(
@@ -82,30 +81,3 @@ def test_infeasible_individuals_expect_nothing_and_equal_ones_the_same(
     costs: list[float], copies: list[float]
 ) -> None:
     np.testing.assert_allclose(expected_copies(np.array(costs), 4), copies)
-
-
-@given(COSTS, st.floats(-1e3, 1e3), st.integers(0, 60), st.integers(0, 2**32))
-def test_copies_are_the_floor_of_what_is_expected_or_one_more(
-    costs: np.ndarray, shift: float, count: int, seed: int
-) -> None:
-    costs = np.round(costs, 3)
-    expected = expected_copies(costs, count)
-    shifted = expected_copies(np.round(costs + np.round(shift, 3), 3), count)
-    np.testing.assert_allclose(shifted, expected, atol=1e-6 * max(count, 1))
-    uniforms = np.random.default_rng(seed).random(len(costs) + 1 + count)
-    parents = np.empty(round(expected.sum()), dtype=np.int64)
-    choose_by_remainders(uniforms, expected, np.empty(len(costs), dtype=np.int64), parents)
-    counts = np.bincount(parents, minlength=len(costs))
-    assert len(parents) == count
-    assert (counts >= np.floor(expected - 1e-9)).all()
-    assert (counts <= np.ceil(expected + 1e-9)).all()
-
-
-def test_copies_are_unbiased() -> None:
-    """The mean of 40000 counts, each of standard deviation ≤ 0.5: six standard errors are 0.015."""
-    expected = np.array([0.9, 0.1, 0.5, 0.5, 1.3, 0.7, 2.2, 0.8])
-    parents, order, counts = np.empty(7, dtype=np.int64), np.empty(8, dtype=np.int64), np.zeros(8)
-    for uniforms in np.random.default_rng(3).random((40_000, 8 + 1 + 7)):
-        choose_by_remainders(uniforms, expected, order, parents)
-        counts += np.bincount(parents, minlength=8)
-    np.testing.assert_allclose(counts / 40_000, expected, atol=0.015)

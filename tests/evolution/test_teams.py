@@ -55,17 +55,6 @@ def test_best_team_is_the_best_of_all(seed: int, num: int, size: int, ties: bool
     assert found.found == (cost < np.inf)
 
 
-@pytest.mark.parametrize("size", [37, 100])
-@pytest.mark.parametrize("free", [0.002, 0.05, 0.6])
-@pytest.mark.parametrize("ties", [False, True])
-def test_best_pair_of_large_populations(size: int, free: float, ties: bool) -> None:
-    judged = world(size, 2, size, free, ties)
-    sums = np.where(judged.hits[0, 1] == 0, judged.own[0][:, None] + judged.own[1], np.inf)
-    i, j = np.unravel_index(np.argmin(sums), sums.shape)  # the first in lexicographic order
-    found = best_team(collisions_of(judged), judged.own)
-    assert (found.individuals.tolist(), found.cost) == ([i, j], sums[i, j])
-
-
 SMALL = 2.0**-53  # 1 + SMALL == 1
 
 

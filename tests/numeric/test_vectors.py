@@ -14,7 +14,6 @@ from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
 from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
-    any_lane,
     ceiling,
     load,
     lower,
@@ -109,19 +108,6 @@ def test_arithmetic_has_the_bits_of_scalars(operation: Function) -> None:
 def test_comparisons_hold_as_those_of_scalars(comparison: Function) -> None:
     assert same(over_lanes(lambda a, b: flag(comparison(a, b)))(), comparison(X, Y))
     assert same(over_lanes(lambda a, b: flag(comparison(a, 0.0)))(), comparison(X, 0.0))
-
-
-def test_a_condition_holds_in_any_lane() -> None:
-    @kernel
-    def any_below(x: FloatArray, limit: float, asked: bool) -> bool:
-        return any_lane((load(x, U(0)) < limit) & asked)
-
-    for lane in range(LANES):
-        x = np.ones(LANES)
-        x[lane] = -1.0
-        assert any_below(x, 0.0, True)
-        assert not any_below(x, -1.0, True) and not any_below(x, 0.0, False)
-    assert not any_below(np.full(LANES, np.nan), np.inf, True)
 
 
 def test_neighbours_are_read_and_written_where_they_are_named() -> None:

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.errors import SettingError
-from evoexp.objectives.placement_criteria import Avoidance, PlacementCriteria
+from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import Model, Task
 from references.placement_numpy import LENGTHS, pinocchio_posture
 
@@ -115,13 +114,3 @@ def test_limits_make_a_branch_infeasible(row: int) -> None:
         assert now[0] == pytest.approx(other[0])
     limits[row] = value - 1e-6, np.inf
     assert model(limits=limits).posture(70.0, 40.0)[1][0] == own[0]
-
-
-def test_weights_that_weigh_nothing_and_obstacles_that_are_not_there_are_refused() -> None:
-    with pytest.raises(SettingError, match="torque_norm_weight: must be above 0, or another weigh"):
-        PlacementCriteria(**(PLAIN | {"torque_norm_weight": 0.0}))
-    with pytest.raises(SettingError, match="torque_weights: must be above 0"):
-        PlacementCriteria(**(PLAIN | {"torque_max_weight": 1.0, "torque_weights": (0.0,) * 3}))
-    avoidances = (Avoidance(weight=1.0, link=0, place=0.5, obstacle=1),)
-    with pytest.raises(SettingError, match=r"avoidances\[0\].obstacle: must be an obstacle of the"):
-        PlacementCriteria(**(PLAIN | {"avoidances": avoidances})).avoided(np.zeros((1, 2)))

@@ -20,7 +20,7 @@ from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import FamilyComparison, compare, compare_families
+from evoexp.report.statistics.comparisons import FamilyComparison, compare_families
 from report_samples import can_be_drawn, page_settings, smoke_results
 
 RULES = read_page_file("evoexp.papers.curkovic").rules
@@ -134,20 +134,6 @@ def test_the_lines_of_tools_are_further_apart_than_their_bodies(outputs: Path) -
     assert (link_motions.tool_distance(condition) >= condition.column("clearance")).all()
 
 
-@pytest.mark.matrix
-def test_headline_claims_are_judged_under_every_variation(outputs: Path) -> None:
-    found = page(outputs, "curkovic_claims")
-    effects, assumed = found.tables
-    conditions = [row[0] for row in effects.rows]
-    assert conditions[0] == "V" and all(label.startswith("V") for label in conditions)
-    assert len(conditions) == 14  # without both numbers of generations, which are capped
-    judged = [claim.name for claim in found.claims]
-    assert judged == ["faster", "hall_beyond_elites", "free_motion"]
-    varied = {row[0]: row[4] for row in assumed.rows}
-    assert varied["`ga.population_size`"] == "V, 50 individuals; V, 200 individuals"
-    assert not any("nothing to compare" in claim.evidence for claim in found.claims)
-
-
 def changed(own: ConditionResults, costs: np.ndarray, refuted: np.ndarray) -> ConditionResults:
     """Return stored runs with other costs and verdicts."""
     verdict = pd.array(~refuted, dtype="boolean")
@@ -201,27 +187,6 @@ def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     judged = compared_settings.of_sweep(judge, results, compared(results))
     readings = [claim.text.rsplit("; ", 1)[1] for claim in judged]
     assert readings == ["Eq. 9 as printed", "Eq. 9 read as symmetric"] * 3
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "verdict"),
-    [
-        (0.0, 20.0, judging.REPRODUCED),
-        (20.0, 0.0, judging.CONTRADICTED),
-        (0.0, 0.0, judging.UNDECIDED),
-    ],
-)
-def test_verdicts_follow_the_rows_of_a_sweep(
-    outputs: Path, first: float, second: float, verdict: str
-) -> None:
-    results, costs = smoke_results(outputs, "curkovic_mutation"), np.arange(12.0)
-    pair = costs + first, costs + second
-    rows = tuple(compare(f"constant {k}", *pair, True, 0.95) for k in range(3))
-    judge = judging.Judge("", page_settings("curkovic_mutation"), RULES)
-    family = compared(results)[0]._replace(rows=rows)
-    (judged,) = compared_settings.of_sweep(judge, results, [family])
-    assert judged.verdict == verdict
-    assert "constant 2 (A12" in judged.evidence
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:

@@ -14,10 +14,10 @@ from evoexp.planners.proofs import judge_motion
 from evoexp.report.figures import shares
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import motion_geometry, run_measures
-from evoexp.report.results.stored_results import ConditionResults, gather
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.inference import Proportion
 from references.link_crossings_numpy import squared_distance
-from report_samples import can_be_drawn, page_settings, smoke_experiment, smoke_results, store
+from report_samples import can_be_drawn, page_settings, smoke_results
 
 LINK, ELLIPSE, BOX = reaching_motions.LINK, reaching_motions.ELLIPSE, reaching_motions.BOX
 TARGET, CONTACT = reaching_motions.TARGET, reaching_motions.CONTACT
@@ -28,30 +28,6 @@ def blind(outputs: Path) -> ConditionResults:
     """Return runs of arms that ignore obstacles and take any solution: most of them touch."""
     words = "collision.blind=true", "planner.success=finite"
     return smoke_results(outputs, "lavoie_7dof", *words).conditions[0]
-
-
-@pytest.mark.matrix
-def test_headline_claims_are_judged_under_every_other_number(outputs: Path) -> None:
-    name = "lavoie_claims"
-    experiment = smoke_experiment(name)
-    store(outputs, experiment)
-    planned, budget = experiment.num_replicates, experiment.budget
-    results = gather(outputs, experiment.conditions, planned, name, budget, "", experiment.options)
-    page = page_of(results, page_settings(name))
-    effects, numbers = page.tables
-    changed = {str(row[0]): row[1] for row in effects.rows}
-    assert list(changed) == [label for label, _ in experiment.conditions]
-    as_read = {label for label, names in changed.items() if names == "as we read it"}
-    assert as_read == {"7-DOF", "10-DOF"}
-    assert changed["10-DOF, long lips"].startswith("`scenario.obstacles[3].center`, ")
-    assert "`scenario.box_x`" in changed["7-DOF, narrow box"]
-    rows = {str(row[0]): row for row in numbers.rows}
-    varied = "7-DOF, b = 1; 7-DOF, b = 5; 10-DOF, b = 1; 10-DOF, b = 5"
-    assert rows["`ga.mutation_power`"][4] == varied
-    texts = [claim.text for claim in page.claims]
-    assert texts[0] == "7-DOF: a position error below 1 in 93.5 % of runs"
-    assert len(texts) == 2 * 3, "arms × headlines"
-    assert [len(each.table()) for each in page.drawings[:3]] == [len(experiment.conditions)] * 3
 
 
 def test_a_sweep_of_one_condition_is_the_page_itself(outputs: Path) -> None:

@@ -68,14 +68,6 @@ def test_a_control_has_the_limits_of_the_planner_beside_it(linear: Prepared) -> 
     np.testing.assert_array_equal(control, link_motions.speed_limits(linear))
 
 
-def test_distances_of_bodies_are_those_of_links(one: Prepared, solution: FloatArray) -> None:
-    q = np.radians(link_motions.sampled(link_motions.executed(one, solution), 20).q)
-    scene = one.problem.scene
-    found = motion_geometry.BodyDistance(scene.model, scene.geometry)(q)
-    expected = motion_geometry.link_distance(one.problem.assembly)(q)
-    np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
 def test_a_contact_lies_on_both_bodies(linear: Prepared) -> None:
     planner, problem = linear
     line = link_motions.straight(linear)
@@ -87,9 +79,3 @@ def test_a_contact_lies_on_both_bodies(linear: Prepared) -> None:
     for arm, link, starts, ends in motion_geometry.joint_positions(problem.assembly, q):
         if f"arm_{arm + 1}_link_{link + 1}" in found.refuted_pair.split(" – "):
             assert squared_distance(starts[0, :2], ends[0, :2], np.array(point)) < 1e-12
-
-
-def test_the_distance_of_points_from_segments_is_the_least() -> None:
-    points, start, end = np.random.default_rng(1).normal(size=(3, 30, 2))
-    least = np.sqrt(squared_distance(start.T, end.T, points.T).min())
-    assert link_motions.to_segment(points, start, end) == pytest.approx(least)

@@ -67,14 +67,6 @@ def test_distances_to_obstacles_are_drawn_for_every_replicate(obstacles: Conditi
     assert [title[0] for title in titles] == ["a", "c", "b", "d"]
 
 
-def test_extensions_have_claims_about_points_motions_and_margins(outputs: Path) -> None:
-    claims = page(outputs, "rana_obstacles").claims
-    assert len(claims) == 3
-    assert all("static obstacles" in claim.text for claim in claims)
-    assert "required 0.5, kept in" in claims[2].evidence
-    assert "required 1, kept in" in claims[2].evidence
-
-
 def test_runs_without_a_free_individual_count_as_never(obstacles: ConditionResults) -> None:
     first, recorded = run_measures.first_feasible(obstacles), "first_feasible_generation"
     assert np.array_equal(np.isinf(first), np.isnan(obstacles.column(recorded)))
@@ -112,14 +104,6 @@ def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
     ]
     apart = (1.0 - near[0] * near[1])[~np.eye(12, dtype=bool)].mean()  # all pairs, sites, arms
     assert shares[0] == pytest.approx(apart, abs=0.05)  # 2000 pairs: four standard errors
-
-
-def test_the_page_of_the_cross_over_tells_its_distance(outputs: Path) -> None:
-    checks = page(outputs, "rana_crossover", *WORDS).checks
-    assert any("cross_over_distance = 100°" in title for title, _ in checks)
-    (told,) = (finding for title, finding in checks if title.startswith("Other distances"))
-    assert all(label in told for label in ("25°", "50°", "200°", "any distance"))
-    assert "no cross-over" not in told
 
 
 def test_the_page_of_the_weights_tells_what_a_collision_costs(outputs: Path) -> None:

@@ -1,6 +1,5 @@
 """Kernels on strings of via-points: redistribution, relaxation, lengths, configurations between."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.paths.interpolation import interpolate_linear
-from evoexp.paths.lengths import measure_paths
 from evoexp.records import FloatArray
-from paths.string_operators import redistribute, relax
+from paths.string_operators import redistribute
 
 ENDS = ["natural", "clamped"]
 SEEDS = st.integers(0, 2**32 - 1)
@@ -121,45 +119,6 @@ def test_a_path_without_length_stays_bit_for_bit(value: float, end: str) -> None
     found = moved(given, [[0, 2], [2, 3]], 8, end)
     assert np.array_equal(found[:, :, 5].view(np.int64), given[:, :, 5].view(np.int64))
     assert not np.array_equal(found[:, :, 4], given[:, :, 4])
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=SEEDS, delta=st.floats(0.0, 1.0), num=st.integers(1, 30))
-def test_relaxation_is_the_papers_loop_bit_for_bit(seed: int, delta: float, num: int) -> None:
-    expected = strings(seed, 3, num, 24)
-    found = expected.copy()
-    found[:, :, 20:] = np.nan  # padding
-    relax(found, delta, 20)
-    for i in range(1, num):
-        before = (expected[:, i - 1] + expected[:, i + 1]) / 2  # Eqs. 8 and 9
-        expected[:, i] = expected[:, i] + delta * (before - expected[:, i])
-    assert np.array_equal(found[:, :, :20], expected[:, :, :20])
-
-
-@pytest.mark.parametrize("num", [1, 2, 20])
-def test_lengths_and_unevenness_are_the_sums_of_the_paper(num: int) -> None:
-    via_points = strings(num, 12, num, 16)
-    via_points[:, :, 3] = 7.0  # a path without length
-    lengths, unevenness = np.full((2, len(ARMS), 16), np.nan)
-    measure_paths(via_points, ARMS, lengths, unevenness)
-    for arm, (first, stop) in enumerate(ARMS):
-        for lane in range(16):
-            path = via_points[first:stop, :, lane].T
-            steps = [math.dist(path[i], path[i - 1]) for i in range(1, num + 1)]
-            uneven = sum(abs(step - sum(steps) / num) for step in steps)
-            assert lengths[arm, lane] == pytest.approx(sum(steps), rel=1e-13)
-            assert unevenness[arm, lane] == pytest.approx(uneven, rel=1e-12, abs=1e-10)
-
-
-@pytest.mark.parametrize("substeps", [1, 2, 3, 10])
-@pytest.mark.parametrize("num", [1, 20])
-def test_configurations_are_at_the_fractions_of_each_segment(num: int, substeps: int) -> None:
-    via_points = strings(num, 4, num, 16, 300.0)
-    found = interpolate_linear(via_points, substeps)
-    at = np.arange(1, num * substeps + 1) / substeps
-    expected = np.apply_along_axis(lambda row: np.interp(at, range(num + 1), row), 1, via_points)
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)  # 20 roundings at 600
-    assert np.array_equal(found[:, substeps - 1 :: substeps], via_points[:, 1:])
 
 
 def test_fewer_than_one_substep_is_refused() -> None:

@@ -16,7 +16,6 @@ from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.collision.scene import Part
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
 from evoexp.evolution.best_team import best_team
 from evoexp.paths.motion import Motion
 from evoexp.planners.coevolution.generations import ProvenTeams
@@ -105,27 +104,6 @@ def test_every_answer_is_proven_and_none_touches(words: str) -> None:
     assert num_solved > 0 or words in MAYBE_SOLVED
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        "curkovic_motion",
-        "lavoie_7dof",
-        "corsepius_shelf",
-        f"{CONTROL}cma_es",
-        f"rrt_connect {COARSE}",
-        "chen_mission robot.body_radius=0.8 budget=smoke",
-        "chen_path robot.body_radius=0.8",
-        "chen_path robot.body_radius=0.8 control=path_climbing",
-        *WITH_OMPL[:2],
-    ],
-)
-def test_the_models_own_search_accepts_what_is_refuted(words: str) -> None:
-    """And so the search by proofs is another one: on some seed the two differ."""
-    trusting = condition(words, "model")
-    assert b"acceptance" not in trusting.to_json()
-    assert any(run.verdict().certified is False for run in (ran(trusting, s) for s in range(12)))
-
-
 def test_the_cheapest_free_strings_are_judged_until_one_is_proven(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -150,14 +128,6 @@ def test_the_cheapest_free_strings_are_judged_until_one_is_proven(
     assert proofs.settle(costs, lambda k: np.array([float(k)])) == 5
     assert asked == [4, 0, 2, 5]
     assert costs.tolist() == [np.inf, np.inf, np.inf, 9.0, np.inf, 5.0]
-
-
-def test_a_verdict_is_asked_for_once() -> None:
-    planner, problem = condition("rana_planar").prepare()
-    solution = planner.solution(problem, planner.sample(problem, np.random.default_rng(0), 1), 0)
-    proofs = Proofs(planner, problem)
-    assert proofs.is_proven(solution) == proofs.is_proven(solution.copy())
-    assert proofs.num_certificates == 1
 
 
 def test_a_refuted_team_counts_as_colliding_once_more() -> None:
@@ -199,10 +169,3 @@ def test_the_log_of_a_proven_search_counts_its_certificates() -> None:
     log = read_log(run_replicate(condition("rana_planar ga.num_generations=400"), 0).content)
     assert log.summary.certified
     assert log.generations[-1].terms["certificates"] >= 1.0
-
-
-def test_other_words_and_answers_that_are_no_motion_are_refused() -> None:
-    with pytest.raises(SettingError, match=r"planner\.acceptance: must be"):
-        condition("rana_planar", "proven")
-    with pytest.raises(SettingError, match=r"planner\.acceptance: must be 'model': the answer is"):
-        condition("chen_placement")

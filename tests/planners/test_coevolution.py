@@ -8,10 +8,8 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
 from evoexp.planners.coevolution.planner import Coevolution, Problem
-from evoexp.records import generations
 from evoexp.report.results.stored_results import ConditionResults
 from matrix import num_cases
 from planners.runs import evolved, ran
@@ -66,38 +64,6 @@ def test_random_search_draws_teams_of_its_own() -> None:
     assert terms["team_cost"] == pytest.approx(judged.cost[k], abs=1e-9)
 
 
-@pytest.mark.examples(3)
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        (
-            "scenario.q_start=[{angles:[90.0,90.0]},{angles:[200.0,10.0]}]",
-            "[1].angles[0]: must be wi",
-        ),
-        (
-            "scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",
-            "q_start: must be free of collision (robots 1 and 2 touch: arm_1_link_2 and arm",
-        ),
-        (
-            "scenario.q_goal=[{tip:[0.9,0.0],elbow:left},{angles:[30.0,120.0]}]",
-            "must be 0 to 0.5 awa",
-        ),
-        (
-            "scenario.q_goal=[{tip:[0.4,0.0]},{angles:[30.0,120.0]}]",
-            "elbow: must be given with tip",
-        ),
-        ("scenario.stationary=[0]", "q_goal[0]: must be the same as its start"),
-        ("ga.hall_depth=0.001", "hall_depth: must be 0, or large enough"),
-        ("planner.chromosome_length=7", "chromosome_length: must be even and at least 2"),
-        ("planner.chromosome_length=0", "chromosome_length: must be "),
-    ],
-)
-def test_what_cannot_be_is_refused(word: str, message: str) -> None:
-    with pytest.raises(SettingError) as refused:
-        prepared(word)
-    assert message in str(refused.value)
-
-
 def test_a_tip_is_reached_by_both_elbows() -> None:
     tip, elbows = np.array([0.1, 0.35]), []
     for elbow in ("left", "right"):
@@ -131,26 +97,6 @@ def test_a_spline_is_executed_between_the_same_configurations() -> None:
         speed = np.abs(np.gradient(own, times, axis=0)).max()
         assert terms[fastest] == pytest.approx(speed, abs=0.05)
         assert plain[fastest] == pytest.approx(np.abs(np.diff(path, axis=0)).max())
-
-
-def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() -> None:
-    """Eq. 10 over 30 generations, with the decay that 30 of 200 have."""
-    (front, problem), method = composed("experiment=curkovic_pareto").prepare(), prepared()[0]
-    both = (generations(each.evolve(problem, np.random.default_rng(9))) for each in (front, method))
-    for one, other in zip(*both, strict=False):
-        assert np.array_equal(one.population, other.population)
-    assert one.index == 30
-    assert one.criteria is not None
-    assert one.criteria.shape == (2, 4, 100)
-    assert one.criteria.sum(axis=1) == pytest.approx(one.costs)
-    assert other.criteria is None
-
-
-def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
-    safety = condition("collision.tcp_radius=0.04", experiment="curkovic_safety", label="")
-    scene = safety.prepare().problem.scene
-    assert set(scene.names) == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}
-    assert [shape.radius for shape, _, _ in scene.shapes] == [0.02, 0.02, 0.04] * 2
 
 
 def worsens(given: Condition, seed: Any) -> bool:

@@ -10,7 +10,7 @@ from evoexp.errors import SettingError
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
+from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
 from planners.runs import evolved, verdict
 
 CAPPED = PotentialFields(**FIELDS, max_unsafeness=7.0)
@@ -27,18 +27,6 @@ def prepared(blocked: Any = (), size: int = 4, own: GridPathGa | None = None) ->
     nodes[tuple(np.array(blocked, dtype=int).reshape(-1, 2).T)] = True
     own = own or planner()
     return own, own.prepare(robot(), scenario(nodes))
-
-
-def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
-    """A labyrinth, whose walks take more numbers than the short block of a small population."""
-    blocked = np.zeros((21, 21), dtype=bool)
-    for x in range(1, 21, 2):
-        blocked[x, :20] = True
-        blocked[x] = np.roll(blocked[x], 1 if x % 4 == 3 else 0)
-    own = planner(population_size=60, mutation_rate=1.0, num_generations=2)
-    problem = own.prepare(robot(), scenario(blocked))
-    for generation in evolved(own, problem, 5):
-        assert all(faults(problem, path, revisits=False) == [] for path in generation.population)
 
 
 def test_permitted_moves_past_corners_are_certified() -> None:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.errors import SettingError
-from planners.runs import evolved, ran
+from planners.runs import ran
 from references import rana_numpy
 
 
@@ -29,26 +28,3 @@ def test_generations_are_starts_and_sweeps_as_a_slow_version_makes_them(
         assert generation.costs == pytest.approx(expected.cost, abs=tolerance)
         assert generation.best_cost == pytest.approx(lowest, abs=tolerance)
         assert generation.num_feasible == np.count_nonzero(expected.collisions == 0)
-
-
-def test_where_more_are_to_be_evaluated_fresh_samples_join() -> None:
-    words = "experiment=rana_planar", "control=multi_start", "ga.num_generations=2"
-    planner, problem = composed(*words).prepare()
-    # a planner whose generations grow by three individuals
-    growing = type("Growing", (), {"answers_are_proven": False})
-    for name in ("sample", "improve", "cost", "solution", "num_generations"):
-        setattr(growing, name, getattr(planner.planner, name))
-    growing.num_evaluations = staticmethod(lambda index: 5 + 3 * index)
-    records = evolved(planner.model_copy(update={"planner": growing}), problem, 1)
-    populations = [record.population for record in records]
-    assert [population.shape[-1] for population in populations] == [5, 8, 11]
-    rng = np.random.default_rng(1)
-    improved = planner.planner.improve(problem, planner.sample(problem, rng, 5), rng)
-    assert np.array_equal(populations[1][..., :5], improved)
-    assert np.array_equal(populations[1][..., 5:], planner.sample(problem, rng, 3))
-
-
-def test_a_planner_without_a_local_operator_is_refused() -> None:
-    must = "control: must be left out: redundant_ga has no local operator to be repeated"
-    with pytest.raises(SettingError, match=must):
-        composed("experiment=lavoie_7dof", "control=multi_start").prepare()

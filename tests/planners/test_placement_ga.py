@@ -3,13 +3,10 @@
 from typing import Any
 
 import numpy as np
-import pytest
 
 from composed import composed
-from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.errors import EvoexpError
-from planners.runs import ran, verdict
+from planners.runs import verdict
 
 
 def condition(*words: str) -> Condition:
@@ -18,28 +15,6 @@ def condition(*words: str) -> Condition:
 
 def prepared(*words: str) -> Any:
     return condition(*words).prepare()
-
-
-@pytest.mark.parametrize(("coding", "last"), [("binary", 0xFFFF), ("gray", 0x8000)])
-def test_the_ends_of_the_range_are_values(coding: str, last: int) -> None:
-    planner, problem = prepared(f"planner.coding={coding}")
-    strings = np.array([[0, last], [0, 0]])
-    values = [planner.solution(problem, strings, k).tolist()[:2] for k in range(2)]
-    assert values == [[-180.0, -180.0], [180.0, -180.0]]
-
-
-def test_without_elitism_the_best_can_get_lost_and_with_it_never() -> None:
-    for elites, times in ((0, range(11, 1000)), (1, [0])):
-        records = ran(condition(f"ga.num_elites={elites}")).records
-        costs = np.array([record.best_cost_in_generation for record in records])
-        assert np.count_nonzero(np.diff(costs) > 0.0) in times
-
-
-def test_a_run_ends_near_the_optimum() -> None:
-    elitist = condition("ga=chen_placement_elitism")
-    costs = [run_replicate(elitist, k).summary.best_cost for k in range(20)]
-    assert min(costs) > 1.72761706
-    assert np.median(costs) < 1.76, "the median of 60 runs is 1.728"
 
 
 def test_postures_are_judged_by_their_bodies() -> None:
@@ -57,57 +32,3 @@ def test_an_infeasible_posture_is_told_as_such() -> None:
     assert [terms[name] for name in ("branch", "cost", "other_cost")] == [-1.0, 250.0, 250.0]
     assert np.isnan(terms["theta_3_deg"])
     assert planner.motion(problem, np.array([0.0, -90.0])) is None
-
-
-TRUTH = "reference=placement_optimum"
-
-
-@pytest.mark.examples(5)
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (
-            "scenario.target=[5,2.6]",
-            "target: must be within the arm's reach: Y_e between −2.5 and 2.",
-        ),
-        ("objective=chen_torque", "objective: no option 'chen_torque'"),
-        (
-            "objective.torqe_norm_weight=1",
-            "torqe_norm_weight: unknown setting; did you mean 'torqu",
-        ),
-        (
-            "objective.torque_norm_weight=0",
-            "torque_norm_weight: must be above 0, or another weight",
-        ),
-        ("objective.torque_norm_weight=-1", "torque_norm_weight: must be at least 0.0, was -1"),
-        (
-            "objective=chen_obstacle_link",
-            "avoidances[0].obstacle: must be an obstacle of the scenari",
-        ),
-        (
-            "planner.angle_range=[90,-90]",
-            "angle_range: must be [least, greatest] with least < great",
-        ),
-        ("planner.coding=grey", "'binary' or 'gray', was 'grey'; did you mean 'gray'?"),
-        ("planner.bits_per_gene=0", "planner.bits_per_gene: must be at least 1, was 0"),
-        ("ga.scaling_multiple=1", "ga.scaling_multiple: must be greater than 1.0"),
-        ("ga=lavoie", "planner.ga: must be a ScaledGenetic"),
-        ("+robot.joint_limits=[[0,0],[0,1],[0,1]]", "joint_limits[0]: must be [least, greatest]"),
-        (
-            "robot.platform_size=[0.2,0.6]",
-            "platform_size: must be [length, height] with length > hei",
-        ),
-        (
-            "robot=planar_7r",
-            "robot: must be one that placement_ga takes (MobileArm), was 'planar_cha",
-        ),
-        (f"{TRUTH} reference.num_angles=7", "reference.num_angles: must be at least 8, was 7"),
-        (f"{TRUTH} control=random_search", "reference: must be left out beside a control"),
-        ("reference=optimum", "reference: no option 'optimum'"),
-    ],
-)
-def test_bad_input_is_refused_in_one_line(words: str, message: str) -> None:
-    with pytest.raises(EvoexpError) as error:
-        prepared(*words.split())
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)

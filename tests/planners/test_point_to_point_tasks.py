@@ -7,7 +7,6 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
 from planners.runs import ran
 
 TREES, STRINGS = "ga=rrt_connect objective=null", "ga.num_generations=60"
@@ -98,31 +97,6 @@ def test_maps_in_space() -> None:
     run = ran(condition(FLOOR, FLOOR_TREES, size, block))
     assert run.last.solved
     assert run.planner.motion(run.problem, run.last.best).q.shape[1] == 3
-
-
-@pytest.mark.parametrize(
-    ("words", "refusal"),
-    [
-        (
-            f"robot=planar_7r scenario=chen {FLOOR_TREES}",
-            "robot: must be one that slides along the 2",
-        ),
-        (f"{FLOOR} {FLOOR_TREES} robot.dimensions=3", "robot: must be one that slides along"),
-        (f"{FLOOR} {FLOOR_TREES} scenario.start=[7,9]", r"scenario\.start: must be a free node"),
-        (f"{FLOOR} {FLOOR_TREES} robot.body_radius=5", "free of contact between bodies"),
-        (
-            f"robot=planar_7r scenario=curkovic_a {LINK_TREES}",
-            "robot: must be planar arms of two li",
-        ),
-        (
-            f"robot=two_links_05 scenario=curkovic_stationary {LINK_TREES}",
-            r"stationary: must be empty: this planner moves all robots, was \[1\]",
-        ),
-    ],
-)
-def test_what_does_not_fit_is_refused(words: str, refusal: str) -> None:
-    with pytest.raises(SettingError, match=refusal):
-        condition(words).prepare()
 
 
 @pytest.mark.parametrize(

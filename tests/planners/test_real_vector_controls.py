@@ -11,7 +11,7 @@ from composed import composed
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import standard_normal
-from evoexp.planners.baselines.real_vectors import real_vectors, transposed_root
+from evoexp.planners.baselines.real_vectors import real_vectors
 from evoexp.records import generations
 
 HAS_PYMOO = importlib.util.find_spec("pymoo") is not None
@@ -142,15 +142,6 @@ def test_objectives_are_names_of_terms() -> None:
         control("nsga2", "control.objectives=[length]").prepare()
 
 
-def test_roots_are_those_of_linear_algebra() -> None:
-    rng = np.random.default_rng(4)
-    tall = rng.normal(size=(60, 30))
-    matrix = tall.T @ tall
-    root = transposed_root(matrix)
-    assert np.allclose(root.T, np.linalg.cholesky(matrix), rtol=0.0, atol=1e-9)
-    assert not np.tril(root, -1).any()
-
-
 def test_weights_of_infeasible_and_of_equal_costs() -> None:
     planner = control("stomp").planner
     assert planner.weights(np.array([3.0, np.inf, 3.0])) == pytest.approx([0.5, 0.0, 0.5])
@@ -177,11 +168,3 @@ def test_runs_depend_on_their_seed_alone_and_costs_fall(name: str) -> None:
     assert one[-1].best_cost != other[-1].best_cost
     assert one[-1].best_cost < 0.8 * one[0].best_cost
     assert chosen.reproducibility == ("bits" if name == "stomp" else "environment")
-
-
-@pytest.mark.parametrize("name", CONTROLS)
-@pytest.mark.parametrize("experiment", ["curkovic_motion", "lavoie_7dof", "corsepius_ball"])
-def test_planners_of_other_codings_are_refused(name: str, experiment: str) -> None:
-    must = "control: must be left out: individuals of .* are no vectors of real numbers"
-    with pytest.raises(SettingError, match=must):
-        control(name, experiment=experiment).prepare()

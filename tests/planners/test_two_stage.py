@@ -89,18 +89,6 @@ def test_the_first_stage_has_no_plan_yet() -> None:
     assert rows[-1].evaluations == both
 
 
-def test_the_manipulator_agrees_with_the_arm_of_the_placement_search() -> None:
-    robot = FloorManipulator(body_radius=0.5, body_height=0.4, link_lengths=(1.0, 0.7, 0.5))
-    arm, rng = robot.arm().build().model, np.random.default_rng(0)
-    data = arm.createData()
-    for _ in range(20):
-        x, y, *angles = rng.uniform(-3.0, 3.0, 5)
-        pin.forwardKinematics(arm, data, np.array([x, *angles]))
-        flat = data.oMi[arm.njoints - 1].act(np.array([0.5, 0.0, 0.0]))
-        place = [flat[0], y, 0.4 + flat[1]]
-        assert end_effector(robot, np.array([x, y, *angles])) == pytest.approx(place, abs=1e-12)
-
-
 def test_a_mission_is_over_a_floor() -> None:
     given: Any = mission()
     grid = given.scenario.grid.model_copy(update={"size": (4, 4, 4)})

@@ -8,7 +8,6 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa, sampled
 from evoexp.records import FloatArray, generations
@@ -53,26 +52,6 @@ def test_samples_of_a_string_are_its_segments_via_points_included() -> None:
     np.testing.assert_array_equal(sampled(strings, 4)[:, ::4], strings)
 
 
-def test_puma_like_arms_move_by_eq_10_and_their_straight_line_collides() -> None:
-    planner, problem = prepared(experiment="rana_puma")
-    q = np.array([20.0, 30.0, -40.0, -70.0, 10.0, 55.0])
-    centres = np.concatenate(problem.sphere_centres(q))
-    slices = problem.collision.arm_spheres
-    assert [stop - first for first, stop in slices] == [9, 9]  # none on the columns
-    for arm, (first, stop) in enumerate(slices):
-        one, two, three = np.deg2rad(q[3 * arm : 3 * arm + 3])
-
-        def link(tilt: float, turn: float = one) -> FloatArray:
-            flat = np.array([np.cos(turn), np.sin(turn), 0.0])
-            return np.cos(tilt) * flat + [0.0, 0.0, np.sin(tilt)]
-
-        shoulder, upper, lower = np.array([0.0, 2.5 * arm, 1.0]), link(two), link(two + three)
-        expected = [shoulder + share * upper for share in np.linspace(0.0, 1.0, 5)]
-        expected += [shoulder + upper + share * lower for share in np.linspace(0.25, 1.0, 4)]
-        assert centres[first:stop] == pytest.approx(np.array(expected), abs=1e-12)
-    assert planner.evaluate(problem, straight(problem, 40))["collisions"] == 3.0
-
-
 @pytest.mark.examples(5)
 @pytest.mark.parametrize(
     "words",
@@ -98,26 +77,6 @@ def test_degenerate_settings_run(words: str) -> None:
     for generation in generations(planner.evolve(problem, np.random.default_rng(0))):
         assert np.isfinite(generation.costs).all()
         assert np.isfinite(generation.population).all()
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("scenario.q_start=[[90,0],[270,0]]", "q_start: must be free of collision (two arms overl"),
-        ("scenario.q_goal=[[90,0],[270,0]]", "scenario.q_goal: must be free of collision"),
-        ("scenario.q_start=[[45,225]]", "q_start: must be one list per arm of the robot"),
-        ("scenario.q_start=[[45,225],[1,2,3]]", "q_start: must be one list per arm of the robot"),
-        ("planner.num_new_trajectories=49", "num_new_trajectories: must be at most the offspring"),
-        (
-            "scenario.obstacles=[{shape: sphere, center: [2.8, 2.8], radius: 0.5}]",
-            "an arm and an obstacle overlap",
-        ),
-    ],
-)
-def test_problems_that_cannot_be_are_refused(word: str, message: str) -> None:
-    with pytest.raises(SettingError) as caught:
-        prepared(word)
-    assert message in str(caught.value)
 
 
 def test_arms_and_obstacles_have_margins_of_their_own() -> None:

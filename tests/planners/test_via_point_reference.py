@@ -90,8 +90,3 @@ def test_without_redistribution_generations_agree_to_rounding(words: str) -> Non
     given = condition(words, "planner.redistribution=false", "ga.num_generations=40")
     for seed in (0, 1):
         assert largest_difference(given, seed) < ROUNDING
-
-
-def test_a_wrong_term_would_be_noticed() -> None:
-    given = condition(PLANAR, "planner.redistribution=false", "ga.num_generations=3")
-    assert largest_difference(given, 0, unevenness_weight=0.0051) > ROUNDING

@@ -4,16 +4,13 @@ import pinocchio as pin
 import pytest
 
 from evoexp.collision.scene import Part, Scene, geometry_scene
-from evoexp.configuration.compose import expand
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.planners.proofs import judge_motion
-from evoexp.playback import contacts
 from evoexp.playback.body_poses import MAX_TICKS, points, ticks
 from evoexp.playback.contacts import clearance, remainder
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import outline
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
-from evoexp.records import generations
 from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 NAMES = sorted(SAMPLES)
@@ -216,21 +213,6 @@ def test_no_joint_is_faster_than_its_limit_and_one_reaches_it(motion: Motion) ->
 def test_a_motion_that_stands_still_takes_its_time() -> None:
     assert seconds_per_instant(Motion(np.ones((2, 1))), np.array([1.0])) == 1.0
     assert SpeedLimits().of(np.array([True]), 8.0).tolist() == [2.0]
-
-
-def test_distances_are_those_of_all_pairs_though_few_are_asked_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    words = ("experiment=motionbenchmaker", "budget=smoke")
-    ((_, panda),) = expand(words, only=("box_panda",))[0].conditions
-    planner, problem = panda.prepare()
-    best = next(generations(planner.evolve(problem, panda.rng(0)))).best
-    motion = planner.motion(problem, best)
-    parts, times = list(planner.parts(problem, motion)), np.linspace(0.0, motion.num_segments, 7)
-    few = clearance(parts, motion, times)
-    monkeypatch.setattr(contacts, "SLACK", 1e6)
-    every = clearance(parts, motion, times)
-    assert np.array_equal(few.least, every.least) and few[1:] == every[1:]
 
 
 def test_points_of_frames_are_where_their_matrices_put_them(shown: Recording) -> None:

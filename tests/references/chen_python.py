@@ -179,13 +179,13 @@ def evolve_paths(
 
 
 class Postures:
-    """Criteria and operators of a problem of `placement_ga`."""
+    """Operators of a problem of `placement_ga`."""
 
     def __init__(self, planner: Any, problem: Any, draw: Draw) -> None:
         self.settings, self.draw = Settings.of(planner.ga), draw
         self.bits, self.gray = planner.bits_per_gene, planner.coding == "gray"
         self.least, self.most = planner.angle_range
-        self.model, self.criteria = problem.model, planner.objective
+        self.model = problem.model  # beside Pinocchio in `test_placement_criteria`
 
     def string(self, individual: Any) -> str:
         """Return the bits of an individual, θ1 first."""
@@ -205,39 +205,8 @@ class Postures:
 
     def cost(self, string: str) -> tuple[float, bool]:
         """Return E of the better θ3 (Eq. 14), and whether any is feasible."""
-        found = [self._measured(*np.radians(self.angles(string)), sign) for sign in (1.0, -1.0)]
-        feasible = [cost for cost, within in found if within]
-        return min(feasible, default=self.criteria.greatest), bool(feasible)
-
-    def _measured(self, one: float, two: float, sign: float) -> tuple[float, bool]:
-        lengths, (x_e, y_e), force = np.split(np.array(self.model.task), [3, 5])
-        sine = (y_e - lengths[0] * np.sin(one) - lengths[1] * np.sin(one + two)) / lengths[2]
-        if abs(sine) > 1.0:
-            return 0.0, False
-        third = np.arcsin(sine) if sign > 0.0 else np.pi - np.arcsin(sine)
-        ways = np.array([one, one + two, third])
-        links = lengths * np.array([np.cos(ways), np.sin(ways)])  # extents along x and y
-        x_p = x_e - links[0].sum()  # Eq. 17
-        inward = links[:, ::-1].cumsum(axis=1)[:, ::-1]  # from each joint to the end
-        jacobian = np.array([-inward[1], inward[0]])  # Eq. 19
-        torques = jacobian.T @ force  # Eq. 8
-        cap, own = self.criteria.greatest, self.criteria
-        dexterity = np.linalg.det(jacobian @ jacobian.T)
-        manipulability = 1.0 / dexterity if dexterity * cap > 1.0 else cap  # Eq. 13
-        cost = own.torque_norm_weight * (torques @ torques)  # Eq. 10
-        cost += own.torque_max_weight * np.abs(np.array(own.torque_weights) * torques).max()
-        cost += own.manipulability_weight * manipulability
-        for weight, link, place, x_o, y_o in self.model.avoided:  # Eq. 12
-            number = np.arange(1, 4)
-            shares = np.where(number < link, 1.0, np.where(number == link, place, 0))
-            x, y = links @ shares + [x_p, 0.0]
-            squared = (x - x_o) ** 2 + (y - y_o) ** 2
-            cost += weight * (1.0 / squared if squared * cap > 1.0 else cap)
-        theta_3 = (np.degrees(third - one - two) + 180.0) % 360.0 - 180.0
-        values = [*np.degrees([one, two]), theta_3, *torques]
-        limits = zip(values, self.model.limits, strict=True)
-        within = all(least <= value <= most for value, (least, most) in limits)
-        return min(float(cost), cap), within
+        branch, own, _ = self.model.posture(*self.angles(string))
+        return float(own[0]), branch >= 0
 
     def next(self, strings: list[str], costs: list[float]) -> list[str]:
         """Return offspring, then elites."""

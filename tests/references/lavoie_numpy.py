@@ -97,9 +97,9 @@ class Breeding:
         self.count = ga.population_size - ga.num_elites
         self.mutation_rate, self.crossover_rate = ga.mutation_rate, ga.crossover_rate
 
-    def first(self, rng: np.random.Generator) -> Array:
-        """Draw the initial population."""
-        draws = rng.random((self.num_genes, self.ga.population_size))
+    def drawn(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw a population."""
+        draws = rng.random((self.num_genes, count))
         if self.bits:
             return np.floor(2.0 * draws)
         return np.asarray(self.scene.low + (self.scene.high - self.scene.low) * draws)
@@ -202,8 +202,8 @@ class Breeding:
         return np.where(chosen, np.clip(mutants, low, high), x)
 
 
-def evolve(condition: Any, rng: np.random.Generator) -> Iterator[Population]:
-    """Yield all generations of all searches."""
+def evolve(condition: Any, rng: np.random.Generator, evolves: bool = True) -> Iterator[Population]:
+    """Yield all generations of all searches; each is drawn afresh if nothing evolves."""
     planner, scene = condition.planner, Scene(condition)
     breeding = Breeding(planner.ga, scene)
     stops = planner.stop_cost_sp1, planner.stop_cost_sp2
@@ -212,11 +212,12 @@ def evolve(condition: Any, rng: np.random.Generator) -> Iterator[Population]:
     for attempt in range(1, planner.num_attempts + 1):
         start = scene.start
         for sub_path in range(2):
-            genomes = breeding.first(rng)
+            genomes, lowest = breeding.drawn(rng, planner.ga.population_size), np.inf
             for index in range(planner.ga.num_generations + 1):
                 angles = breeding.angles(genomes)
                 costs = scene.costs(sub_path, start, angles)
-                end, lowest = angles[:, np.argmin(costs)], float(costs.min())
+                if evolves or costs.min() < lowest or index == 0:
+                    end, lowest = angles[:, np.argmin(costs)], float(costs.min())
                 if sub_path == 1 and lowest < best_cost:
                     best_cost, best = lowest, np.concatenate([scene.start, start, end])
                 if sub_path == 0 and (not best.size or (best_cost == np.inf and lowest < best_via)):
@@ -224,7 +225,10 @@ def evolve(condition: Any, rng: np.random.Generator) -> Iterator[Population]:
                 yield Population(attempt, sub_path + 1, genomes, costs, best_cost, best)
                 if lowest < stops[sub_path] or index == planner.ga.num_generations:
                     break
-                genomes = breeding.next(rng, genomes, costs, index)
+                if evolves:
+                    genomes = breeding.next(rng, genomes, costs, index)
+                else:
+                    genomes = breeding.drawn(rng, breeding.count)
             if not lowest < limits[sub_path]:
                 break
             start = end

@@ -133,9 +133,3 @@ def _nearest(parents: list[Any], child: Any, scope: Any) -> list[Any]:
     steps = [float((np.abs(child - line[-1]) / scope).max()) for _, line in parents]
     line: list[Any] = parents[int(np.argmin(steps))][1]
     return line
-
-
-def path(problem: Problem, planner: Any, rng: np.random.Generator) -> tuple[Any, int, str]:
-    """Search all phases; return postures, evaluations, and why the search ended."""
-    found = list(cycles(problem, planner, rng))
-    return found[-1].best, found[-1].evaluations, found[-1].reason

@@ -10,9 +10,7 @@ import scipy
 from evoexp.errors import SettingError
 from evoexp.references.grid_frontier import (
     GridFrontier,
-    arrivals_of,
     best_walk,
-    best_walks,
     frontier,
     network_of,
 )
@@ -148,16 +146,6 @@ def test_the_bound_holds_for_paths_through_every_node() -> None:
     assert all(floors[number] <= least[number] + 1e-12 for number in least)
 
 
-@pytest.mark.parametrize("size", [(7, 6), (4, 4, 3)])
-def test_walks_of_all_numbers_of_nodes_are_those_of_each(size: tuple[int, ...]) -> None:
-    network, epsilon = network_of(solvable(size, 0.3, 1, planner())), 0.3
-    for mu in (0.1, 0.7, 2.0):
-        arrivals = arrivals_of(network, epsilon)
-        found, walk = best_walks(arrivals, mu * network.unsafeness, 20)
-        np.testing.assert_allclose(found, least_costs(network, epsilon, mu, 20), rtol=1e-8)
-        assert (len(walk), walk[0], walk[-1]) == (20, *network.ends)
-
-
 def test_walks_too_short_to_arrive_are_refused() -> None:
     network = network_of(solvable((6, 6), 0.2, 1, planner()))
     refusal = r"reference\.max_nodes: must be as many as a path from .*, was 3"
@@ -180,18 +168,6 @@ def test_the_shortest_weighted_path_is_that_of_a_graph_made_anew(mu: float) -> N
     for nodes in (path, found[-1][1]):
         cost = sum(edges[pair] for pair in pairwise(nodes.tolist()))
         assert cost == pytest.approx(least, rel=1e-12)
-
-
-def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:
-    own = planner()
-    problem = solvable((16, 16), 0.25, 3, own)
-    paths = [path for _, path in frontier(network_of(problem), np.geomspace(1e-4, 10.0, 50))]
-    nodes = [problem.fields.grid.coordinates[path].astype(float).ravel() for path in paths]
-    terms = [own.evaluate(problem, each) for each in nodes]
-    lengths = [term["distance"] for term in terms]
-    sums = [term["unsafeness"] * term["num_nodes"] for term in terms]
-    assert lengths == sorted(lengths)
-    assert sums == sorted(sums, reverse=True)
 
 
 @pytest.mark.matrix

@@ -7,8 +7,7 @@ import pytest
 
 import composed
 from evoexp.references.grid_frontier import GridFrontier, known_maps
-from planners.grid_samples import planner, solvable
-from references.test_grid_frontier import SETTINGS, all_simple_paths, path_cost
+from references.test_grid_frontier import path_cost
 from shipped_conditions import expanded
 
 EXPERIMENTS = ("chen_path", "chen_lingering", "chen_claims")
@@ -68,22 +67,3 @@ def test_the_script_finds_what_is_stored(script: Any) -> None:
     stored, found = known_maps()[own.key(problem)], script.searched(own, problem)
     assert (found.paths, found.improved) == (stored.paths, stored.improved)
     np.testing.assert_allclose(found.bounds, stored.bounds, rtol=1e-12)
-
-
-@pytest.mark.matrix
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("weights", [(0.05, 2.0), (0.3, 1.0)])
-def test_the_scripts_bounds_are_below_all_paths(
-    script: Any, weights: tuple[float, float], seed: int
-) -> None:
-    own = planner(weights)
-    problem = solvable((4, 4), 0.35, seed, own)
-    found = script.searched(GridFrontier(planner=own, **SETTINGS), problem)
-    costs = [(len(path), path_cost(own, problem, path)) for path in all_simple_paths(problem)]
-    least = min(cost for _, cost in costs)
-    for number, cost in costs:
-        if number - 2 < len(found.bounds):
-            assert found.bounds[number - 2] <= cost + 1e-12
-    assert 0.97 * least <= min(found.bounds)
-    best = min(path_cost(own, problem, path) for path in found.paths)
-    assert least - 1e-12 <= best <= 1.02 * least

@@ -10,11 +10,9 @@ from composed import composed
 from evoexp.batch import replicate
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import (
-    difference,
     farthest,
     field_differences,
     fingerprint,
-    same_fingerprint,
 )
 from evoexp.batch.runner import Batch
 from evoexp.batch.runner_settings import RunnerSettings
@@ -73,16 +71,8 @@ def test_a_reference_stands_around_the_planner_and_overrides_reach_it() -> None:
 @pytest.mark.parametrize(
     ("field", "words", "message"),
     [
-        (
-            "reference",
-            ["control=random_search"],
-            "must be left out beside a control, was 'counted'",
-        ),
-        (
-            "reference.planner",
-            ["+reference.planner=1"],
-            "must be left out: it is the chosen planner",
-        ),
+        ("reference", ["control=random_search"], "must be left out beside a control, was"),
+        ("reference.planner", ["+reference.planner=1"], "must be left out: it is the chosen"),
         ("reference.rows", ["+reference.rows=x"], "must be a whole number, was 'x'"),
         ("reference", ["+reference.rows=4"], "must be chosen: "),
     ],
@@ -156,17 +146,6 @@ def test_the_report_reads_references_beside_the_planners(
     page = said("report", *(c.id[:12] for _, c in conditions)).split("report: ")[1].strip()
     assert "reference" in Path(page).read_text()
     assert Path(page).with_name("convergence.csv").read_text().count("reference") == 1
-
-
-def test_numbers_are_compared_to_a_tolerance() -> None:
-    assert difference([1.0, np.inf, np.nan], [1.0, np.inf, np.nan]) == 0.0
-    assert difference(1e6, 1e6 + 1.0) == pytest.approx(1e-6)
-    assert difference(1e-12, 0.0) == 1e-12
-    assert difference([1.0], [np.inf]) == difference([1.0], [1.0, 2.0]) == np.inf
-    assert same_fingerprint("cost 1.0", "cost 1.0000000001")
-    assert not same_fingerprint("cost 1.0", "cost 1.00000001")
-    assert same_fingerprint("cost inf", "cost inf")
-    assert not same_fingerprint("0" * 32, "cost 0.0")
 
 
 def test_references_run_first(tmp_path: Path) -> None:

@@ -1,12 +1,11 @@
 """Best known lengths: the file, its update, and the targets that follow from it."""
 
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import pytest
 
+from composed import script
 from evoexp.errors import EvoexpError
 from evoexp.report.figures.effort_curves import share_table
 from evoexp.report.pages import comparison
@@ -27,16 +26,11 @@ KNOWN = {"123456789012": ONE, "00000000001e": TWO}  # keys that YAML would take 
 
 
 @pytest.fixture
-def update() -> ModuleType:
-    """Return the script."""
-    path = str(ROOT / "scripts/update-best-known")
-    spec = spec_from_loader("update_best_known", SourceFileLoader("update_best_known", path))
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def update() -> Any:
+    return script("update-best-known")
 
 
-def test_what_is_written_is_read(update: ModuleType) -> None:
+def test_what_is_written_is_read(update: Any) -> None:
     for entries in (KNOWN, {}, shipped_best_known()):
         assert parsed(update.to_yaml(entries), "x") == entries
     assert parsed(b"", "x") == {}
@@ -78,7 +72,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_only_shorter_lengths_are_put_in(update: ModuleType) -> None:
+def test_only_shorter_lengths_are_put_in(update: Any) -> None:
     found = {
         "123456789012": ONE.model_copy(update={"length": 0.5}),
         "00000000001e": TWO.model_copy(update={"problem": "other", "length": 1.5, "replicate": 3}),
@@ -109,7 +103,7 @@ def test_targets_are_multiples_of_the_best_known_not_of_the_best_here(
 
 
 def test_the_script_writes_what_the_store_has_of_these_problems(
-    update: ModuleType,
+    update: Any,
     stored: Path,
     results: Results,
     tmp_path: Path,

@@ -19,10 +19,9 @@ from evoexp.papers.rana import claims as rana_claims
 from evoexp.papers.rana import motions
 from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import swept_settings
 from evoexp.report.results.stored_results import Results
 from evoexp.store.run_directory import RunDirectory
-from report_samples import REPORT, expand, figure_stems, store
+from report_samples import REPORT, expand, store
 
 SCRIPT = """
 import sys
@@ -35,7 +34,6 @@ FIGURES = ["fig_1_arms", "fig_2_via_points", "fig_3_circles", "fig_4_snapshots",
 FIGURES += ["fig_6_paths", "fig_7_distances"]
 SPATIAL = ["fig_8_arm", "fig_9_two_arms", "fig_11_snapshots", "fig_12a_fitness"]
 SPATIAL += ["fig_12b_configuration_space", "fig_12b_operational_space", "fig_13_distances"]
-THREE_ARMS = ("rana_three_arms", "scenario=rana_three_arms")
 
 
 def draw(outputs: Path, experiment: Experiment, page: str | None = "rana", *formats: str) -> Path:
@@ -148,24 +146,6 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path, blank_figures: None)
     assert left == {"index.html", "index.md"}  # the figures of before are gone
 
 
-@pytest.mark.matrix
-def test_arms_in_space_have_the_papers_other_figures(tmp_path: Path) -> None:
-    experiment = expand("rana_puma", "ga.num_generations=2")
-    store(tmp_path, experiment)
-    page = draw(tmp_path, experiment, "rana", "svg")
-    assert figure_stems(page.parent) == set(SPATIAL)
-    text = page.read_text()
-    numbers = re.findall(r"^### Fig\. (\w+):", text, re.MULTILINE)
-    assert list(dict.fromkeys(numbers)) == ["8", "9", "11", "12a", "12b", "13"]
-    assert "C5 = 3 of 40 instants" in text
-    both = pd.read_csv(page.parent / "fig_9_two_arms.csv")
-    assert set(both["reach"]) == {2.0} and len(both) == 2 * 2 * 3
-    paths = pd.read_csv(page.parent / "fig_12b_operational_space.csv")
-    assert {"x", "y", "z", "joint_3_deg"} <= set(paths)
-    ends = paths[(paths["instant"] == 40) & (paths["arm"] == 0)]
-    assert len(ends.round(9)[["x", "y", "z"]].drop_duplicates()) == 1
-
-
 def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
     words = ("ga.num_generations=3", "num_replicates=3")
     name, hall = ("experiment=curkovic_methods", "budget=smoke"), "ga.hall_depth=0.25"
@@ -187,21 +167,6 @@ def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
     last = final.loc[final["method"] == "V", "value"]
     assert curve["value"].iloc[-1] == pytest.approx(last.mean())
     assert curve["deviation"].iloc[-1] == pytest.approx(last.std())
-
-
-def test_an_experiment_without_a_page_has_results_pictures_and_parameters(
-    stored: Path, blank_figures: None
-) -> None:
-    page = draw(stored, expand(*THREE_ARMS), None)
-    stems = ("convergence", "values", "scene", "joints", "covers")
-    files = {f"{stem}.{kind}" for stem in stems for kind in ("csv", "json", "png", "svg")}
-    found, text = set(contents(page)), page.read_text()
-    assert files < found
-    tables = {name for name in found if name.endswith(".tex")}
-    assert tables and all(f"[tex]({name})" in text for name in tables)
-    motions = found - files - tables - {"index.html", "index.md"}
-    assert motions and all(f"({name})" in text and name.startswith("motion") for name in motions)
-    assert "## Claims" not in text
 
 
 def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> None:
@@ -228,25 +193,3 @@ def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
     assert mpl.rcParams["svg.hashsalt"] == mpl.rcParamsDefault["svg.hashsalt"]
     pyplot = sys.modules.get("matplotlib.pyplot")  # axes in space import it
     assert pyplot is None or pyplot.get_fignums() == []
-
-
-@pytest.mark.matrix
-def test_varied_conditions_are_told_apart_and_compared_with_their_own_control(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As where an experiment names its conditions so; those of `run -m` have their own page."""
-    monkeypatch.setattr(swept_settings, "sweep_of", lambda results: None)
-    words = ["experiment=rana_planar", "budget=smoke", "ga.num_generations=1"]
-    experiment = compose.expand([*words, "ga.population_size=8,10"], multirun=True)[0]
-    store(tmp_path, experiment)
-    page = draw(tmp_path, experiment, "rana", "svg")
-    text = page.read_text()
-    assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [
-        f"via-point GA · population_size={size} against {control} · population_size={size}"
-        for size in (10, 8)
-        for control in ("multi-start", "random search")
-    ]
-    title = "### Fig. 4: snapshots of the motion in operational space (via-point GA · "
-    assert f"{title}population_size=8)" in text
-    assert (page.parent / "fig_7_distances_2_via_point_ga_population_size_10.svg").is_file()
-    assert re.search(r"\| `ga\.population_size` \([^|]*population_size=8[^|]*\) \| 8 \|", text)

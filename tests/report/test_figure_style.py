@@ -230,20 +230,6 @@ def test_a_style_file_that_is_none_is_refused(tmp_path: Path, text: str, wrong: 
         drawn(plain, ("svg",), 100, "page", str(path))
 
 
-@pytest.mark.parametrize(
-    ("word", "refusal"),
-    [
-        ("report.width=colum", "report.width: must be one of 'page' or 'column', was 'colum'; did"),
-        ("report.style=none.mplstyle", "report.style: must be the path of a matplotlib style file"),
-    ],
-)
-def test_settings_are_refused_before_anything_is_drawn(
-    word: str, refusal: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["report", "rana_planar", word]) == 2
-    assert refusal in capsys.readouterr().err
-
-
 def test_the_width_is_that_of_the_report(
     stored: Path, blank_figures: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -74,18 +74,6 @@ def test_conditions_of_other_effort_share_an_axis_of_evaluations() -> None:
     assert (axes.get_xlabel(), axes.get_xlim()[1]) == ("evaluations", 300.0)
 
 
-@pytest.mark.parametrize("count", [3, 8, 20])
-def test_no_two_conditions_share_a_colour_and_a_line(count: int) -> None:
-    table = curves(*[10.0] * count)
-    best = table[table["quantity"] == convergence.NAMES["best_cost"]]
-    (axes,) = convergence.draw_best(best).axes
-    lines = axes.get_lines()
-    looks = {(to_hex(line.get_color()), str(line.get_linestyle())) for line in lines}
-    assert len(looks) == min(count, 12)  # of dashes all kinds have one name
-    names = [str(line.get_label()).partition(" (")[0] for line in lines]
-    assert names == [f"condition {k}" for k in range(count)]
-
-
 def values(*runs: list[float]) -> Axes:
     """Return the axes that show the values of some conditions' runs."""
     parts = [

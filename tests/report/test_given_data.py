@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from evoexp.errors import SettingError
 from evoexp.report.figures.effort_curves import length_table, share_table
@@ -92,33 +93,10 @@ def test_a_planner_without_any_answer_does_not_widen_the_axis(
     assert np.isinf(table[table["planner"] == "never (given)"]["median"]).all()
 
 
-REFUSED = {
-    "planner,problem,seed,queries": "line 1, cost: must be there once, was '0 times'",
-    "planner,problem,seed,querys,cost": "line 1: must be the columns .*did you mean 'queries'",
-    "planner,problem,seed,queries,cost,cost": "line 1, cost: must be there once, was '2 times'",
-    "planner;problem;seed;querys;cost": "line 1: must be the columns .*did you mean 'queries'",
-    HEAD: "must be a file with a row per improvement of a run",
-    f"{HEAD}\nA,p,1,10": "line 2: must be 5 cells, as in the first line, was 4",
-    f"{HEAD}\n,p,1,10,2.0": "line 2, planner: must be a name, was ''",
-    f"{HEAD}\nA,\x1bp,1,10,2.0": "line 2, problem: must be a name",
-    f"{HEAD}\nA,p,one,10,2.0": "line 2, seed: must be a whole number",
-    f"{HEAD}\nA,p,1,10,2.0\n\nA,p,1,-3,1.0": "line 4, queries: must be a whole number",
-    f"{HEAD}\nA,p,1,12.5,2.0": "line 2, queries: must be a whole number",
-    f"{HEAD}\nA,p,1,1e-3,2.0": "line 2, queries: must be a whole number",
-    f"{HEAD}\nA,p,1,1e18,2.0": "line 2, queries: must be a whole number",
-    f"{HEAD}\nA,p,1,inf,2.0": "line 2, queries: must be a whole number",
-    f"{HEAD}\nA,p,nan,10,2.0": "line 2, seed: must be a whole number",
-    f"{HEAD}\nA,p,0x1,10,2.0": "line 2, seed: must be a whole number",
-    f"{HEAD}\nA,p,1,10,1,5": "line 2: must be 5 cells, as in the first line",
-    f"{SEMICOLONS}\nA;p;0;10;1,5": "line 2, cost: must be a length above 0",
-    f"{SEMICOLONS}\nA;p;0;1,000;1.5": "line 2, queries: must be a whole number",
-    f"{HEAD}\nA,p,1,10,0": "line 2, cost: must be a length above 0, or empty .*, was '0'",
-    f"{HEAD}\nA,p,1,10,-inf": "line 2, cost: must be a length above 0",
-    f"{HEAD}\nA,p,1,10,nan": "line 2, cost: must be a length above 0",
-    f"{HEAD}\nA,p,1,10,1_0": "line 2, cost: must be a length above 0",
-    f"{HEAD}\nA,p,1,10,1e999": "line 2, cost: must be a length above 0",
-    f'{HEAD}\nA,"p,1,10,2.0': "line 2: must be a line of CSV",
-}
+LINES: dict[str, dict[str, str]] = yaml.safe_load(
+    Path(__file__).with_name("refused_data.yaml").read_text()
+)
+REFUSED = {f"{HEAD}\n{rows}": said for rows, said in LINES["rows"].items()} | LINES["files"]
 
 
 @pytest.mark.parametrize(("text", "said"), REFUSED.items())

@@ -146,12 +146,6 @@ def test_extremes_of_many_motions_are_those_of_all_values(lengths: list[int]) ->
         np.testing.assert_array_equal(q[0] + q[1], values)
 
 
-def test_the_first_of_equal_replicates_is_kept() -> None:
-    both = np.array([[1.0, 5.0]]), np.array([[2.0, 6.0]])
-    (found,) = motion_geometry.extremes([0, 1], both.__getitem__, [lambda q: 0.0 * q[0]])
-    np.testing.assert_array_equal([found.at_lowest, found.at_highest], [both[0]] * 2)
-
-
 def volume(triangles: np.ndarray) -> float:
     a, b, c = triangles.transpose(1, 0, 2)
     return float((np.cross(a, b) * c).sum() / 6.0)  # positive: each is seen from outside
@@ -182,15 +176,6 @@ def test_a_large_mesh_is_drawn_by_corners_of_its_hull() -> None:
     assert found is not None and len(found) <= surfaces.MOST_CORNERS
     triangles, hull = surfaces.triangles_of("mesh", np.zeros(3), found), ConvexHull(points).volume
     assert 0.9 * hull < volume(triangles) <= hull + 1e-9
-
-
-def test_poses_place_as_matrices_do() -> None:
-    rng = np.random.Generator(np.random.PCG64(2))
-    triangles, pose = rng.normal(size=(7, 3, 3)), rng.normal(size=7)
-    pose[3:] /= np.sqrt((pose[3:] ** 2).sum())
-    m = matrix(pose)
-    truth = triangles @ m[:3, :3].T + m[:3, 3]
-    assert np.allclose(surfaces.placed(triangles, pose), truth, atol=1e-12)
 
 
 DRAWN = ("grid", "three arms", "postures")  # in a plane, in a row, in space; others with --all

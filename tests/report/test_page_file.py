@@ -10,7 +10,6 @@ import pytest
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.pages.page_builder import build, page_of
 from evoexp.report.pages.page_file import PageFile, read_page_file
-from evoexp.report.pages.page_scope import Functions, Scope
 from evoexp.report.results.stored_results import Results
 from guests import on_path, write_distribution
 from report_samples import page_settings
@@ -110,24 +109,6 @@ def test_a_mistake_is_one_line(
     with pytest.raises(kind) as fault:
         read(PAGE.replace(right, wrong))
     assert message in str(fault.value) and "\n" not in str(fault.value)
-
-
-def test_a_value_is_computed_once_for_all_that_name_it() -> None:
-    calls: list[str] = []
-
-    def base() -> int:
-        calls.append("base")
-        return 1
-
-    def of_item(item: int, base: int) -> int:
-        calls.append(f"item {item}")
-        return item + base
-
-    scope = Scope(Functions({"base": base, "of_item": of_item}), {})
-    assert [scope.inner(item=k)["of_item"] for k in (4, 5, 4)] == [5, 6, 5]
-    assert sorted(calls) == ["base", "item 4", "item 5"]
-    with pytest.raises(KeyError):
-        scope["nothing"]
 
 
 PAPERS = ("chen", "corsepius", "curkovic", "lavoie", "rana")

@@ -83,13 +83,6 @@ def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -
     assert found == ["via_point_ga", "random_search", "via_point_ga"]
 
 
-def test_runs_keep_their_labels_seeds_and_effort(results: Results) -> None:
-    for own, condition in zip(of_results(results.evolved), results.evolved, strict=True):
-        assert (own.planner, own.problem.name) == (condition.label, "rana_planar")
-        assert own.replicates == tuple(condition.summaries.index)
-        assert np.array_equal(own.spent, condition.column("collision_queries"))
-
-
 def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
     table, spent = answer_table(SOME), np.array([9000.0, 9100.0, 9200.0])
     assert tuple(table.columns) == Answer._fields

@@ -44,30 +44,3 @@ def test_runs_by_prefixes_of_their_hashes(capsys: pytest.CaptureFixture[str]) ->
     text = index.read_text()
     assert f"`evoexp report {one[:12]} {two[:12]}`" in text
     assert f"{one[:12]} against {two[:12]}" in text
-
-
-BOTH = "overrides: must be left out where runs are given by their hashes"
-
-
-@pytest.mark.examples(3)
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["rana_plana"], "experiment: no option 'rana_plana'; did you mean 'rana_planar'?"),
-        (["ffffffffffff"], "hash: no run 'ffffffffffff' among the 4"),
-        (["rana_planar", "rana_x"], "experiment: no option 'rana_x'"),
-        (["rana_planar", "seed=77"], "try: evoexp run experiment=rana_planar seed=77"),
-        (["rana_planar", "ga.pop_size=3"], "ga.pop_size: unknown setting"),
-        (["rana_planar", "report.dpi=0"], "report.dpi: must be at least 1, was 0"),
-        (["rana_planar", *SMALL, "report.figures=ranna"], "no option 'ranna'; did you mean 'rana'"),
-        (["HASH", "budget=smoke"], BOTH),
-    ],
-)
-def test_what_cannot_be_reported_is_one_line(
-    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    prefix = expand("rana_planar").conditions[0].condition.id[:8]
-    assert cli.main(["report", *(word.replace("HASH", prefix) for word in words)]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err and captured.err.count("\n") == 1
-    assert captured.out == ""

@@ -10,7 +10,6 @@ from evoexp.errors import NothingStored
 from evoexp.report.pages import markdown
 from evoexp.report.pages.index import document
 from evoexp.report.pages.page_parts import Page
-from evoexp.report.results import stored_results
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
@@ -49,15 +48,6 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     assert math.isnan(ga.spread("no such column").median)
 
 
-@pytest.mark.parametrize(("asked", "planned"), [(1, 2), (None, 2), (5, 5)])
-def test_every_stored_replicate_is_read_however_many_are_planned(
-    stored: Path, asked: int | None, planned: int
-) -> None:
-    ga = gathered(stored, asked).conditions[0]
-    assert (ga.done, ga.planned, list(ga.solutions)) == (2, planned, [0, 1])
-    assert set(ga.generations["replicate"]) == {0, 1}
-
-
 def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: Path) -> None:
     experiment = expand("rana_planar", "num_replicates=1", "ga.num_generations=1")
     ga = experiment.conditions[0].condition
@@ -89,18 +79,3 @@ def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
     assert (first.done, first.failed, first.failures) == (1, 1, {1: "worker died"})
     assert (second.done, second.failed, second.solutions) == (0, 0, {})
     assert found.with_data == (first, third)
-
-
-def test_logs_are_opened_when_a_page_asks_for_what_they_hold(
-    stored: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gathered(stored, 2)  # summary.parquet is there
-    for name in ("read_generations", "read_solution", "read_log"):
-        monkeypatch.setattr(stored_results, name, None)  # to be called by nobody
-    ga = gathered(stored, 2).conditions[0]
-    assert (ga.done, ga.solved) == (2, int(ga.summaries["solved"].sum()))
-    for part in ("generations", "solutions", "first_solution"):
-        with pytest.raises(TypeError, match="not callable"):
-            getattr(ga, part)
-    monkeypatch.undo()
-    assert ga.generations is ga.generations and ga.solutions is ga.solutions, "read once"

@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from evoexp.report.statistics.claim_rules import KINDS, Rules, read_rules
 from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
 from evoexp.report.statistics.inference import Proportion, fisher_exact, runs_for_effect
 from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED, UNDECIDED, greater
-from matrix import matrices_are_asked_for
 from report_samples import hearing, page_settings
 
 LOW = np.arange(12.0)
@@ -165,44 +163,6 @@ def test_an_undecided_claim_says_how_many_runs_would_decide() -> None:
     shares = hearing("greater").greater("", some, few)
     assert shares.evidence == "about 90 runs of each would decide"
     assert hearing("greater").greater("", EMPTY, few).evidence == ""
-
-
-STUDIES = 2000 if matrices_are_asked_for() else 200
-MOST = 0.07 if matrices_are_asked_for() else 0.11  # false verdicts of so many, at a level of 0.05
-Draw = Callable[[np.random.Generator], np.ndarray]
-DRAWS: dict[str, Draw] = {
-    "smooth": lambda rng: rng.gamma(3.0, size=20),
-    "tied": lambda rng: np.round(rng.gamma(2.0, size=20)),
-    "few": lambda rng: np.round(rng.gamma(2.0, size=10)),
-    "censored": lambda rng: np.where(rng.random(20) < 0.3, np.inf, rng.gamma(2.0, size=20)),
-}
-
-
-@pytest.mark.parametrize("draw", DRAWS.values(), ids=DRAWS)
-def test_where_nothing_differs_better_is_seldom_said(draw: Draw) -> None:
-    rng, said = np.random.default_rng(20), []
-    for _ in range(STUDIES):
-        said.append(judged("better", compare("", draw(rng), draw(rng), True, 0.95), "lower"))
-    assert np.mean([verdict != UNDECIDED for verdict in said]) <= MOST
-
-
-def test_where_something_differs_better_is_said_and_never_the_wrong_way() -> None:
-    rng, said = np.random.default_rng(1), []
-    for _ in range(STUDIES):
-        x, y = rng.normal(0.0, size=20), rng.normal(1.2, size=20)
-        said.append(judged("better", compare("cost", x, y, True, 0.95), "lower"))
-    assert said.count(REPRODUCED) > 0.85 * STUDIES
-    assert said.count(CONTRADICTED) <= 0.001 * STUDIES
-
-
-def test_of_six_equal_settings_none_is_said_to_be_better_or_best() -> None:
-    rng, said = np.random.default_rng(2), []
-    for _ in range(STUDIES):
-        own, *others = rng.gamma(3.0, size=(6, 20))
-        rows = adjusted([compare("cost", own, other, True, 0.95) for other in others])
-        median = bool(np.median(own) <= np.median(others, axis=1).min())
-        said.append([judged("better than all", "", rows), judged("best", "", rows, median)])
-    assert (np.mean(np.array(said) != UNDECIDED, axis=0) <= MOST).all()
 
 
 ENTRY = 'told: {{claim: "{{who}}a claim of {{metric}}", source: "section 5", kind: {kind}, '

@@ -1,16 +1,13 @@
 """The script that compares interpreters, libraries, processors and surroundings."""
 
 import itertools
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
-from pathlib import Path
 from typing import Any
 
 import pytest
 
+import composed
 from evoexp.batch.reproduction import TOLERANCE
 
-SCRIPT = Path(__file__).parents[2] / "scripts" / "check-matrix"
 PROVEN = (  # searches that ask the certifier, and answer by what it says
     *(
         ("certified_search", f"{x}: proofs")
@@ -22,11 +19,7 @@ PROVEN = (  # searches that ask the certifier, and answer by what it says
 
 @pytest.fixture(scope="module")
 def script() -> Any:
-    spec = spec_from_loader("check_matrix", SourceFileLoader("check_matrix", str(SCRIPT)))
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return composed.script("check-matrix")
 
 
 def some_factors(script: Any) -> dict[str, list[Any]]:

@@ -109,21 +109,6 @@ def test_nothing_that_was_set_aside_is_overwritten(tmp_path: Path) -> None:
     assert not any(map(is_set_aside, ("0001.mcap", ".damaged", "0001.mcap.damaged.tmp")))
 
 
-def test_damage_that_keeps_size_and_time_is_seen_by_who_reads_the_logs(
-    run: RunDirectory, add: Add
-) -> None:
-    for replicate in (0, 1):
-        add(replicate)
-    assert summary_table(run).num_rows == 2
-    status = run.log_path(1).stat()
-    flip(run.log_path(1))
-    os.utime(run.log_path(1), ns=(status.st_atime_ns, status.st_mtime_ns))
-    assert summary_table(run).num_rows == 2
-    with pytest.warns(DamagedStore, match="0001.mcap .altered"):
-        assert summary_table(run, thorough=True).num_rows == 1
-    assert whole_logs(run) == {0}, "and by everybody from then on"
-
-
 def test_a_log_of_another_version_is_left_out_and_left_alone(
     run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -274,14 +259,6 @@ def test_damage_is_named_and_a_damaged_run_hides_no_other(
         run.check()
 
 
-@pytest.mark.parametrize("content", ["", "{", '{"plans": 1}', '{"plans": [{"n": 1}]}'])
-def test_damaged_plans_are_set_aside(run: RunDirectory, content: str) -> None:
-    (run.path / "plans.json").write_text(content)
-    mended(run, "plans.json")
-    run.note_plan(3)
-    assert run.plans()[0].num_replicates == 3
-
-
 def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
     run.replicates.rmdir()
     run.replicates.touch()
@@ -289,15 +266,6 @@ def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
     mended(run, "replicates (damaged: not a directory")
     run.create(CONFIG, {})
     assert run.replicates.is_dir()
-
-
-def test_stray_files_are_no_logs(run: RunDirectory, add: Add) -> None:
-    add(1)
-    for name in ("00001.mcap", "1.mcap", "notes.txt", "0001.mcap.damaged", "١٢٣٤.mcap", "x.mcap"):
-        (run.replicates / name).write_bytes(b"")
-    (run.replicates / "folder").mkdir()
-    assert run.completed() == {1}
-    assert summary_table(run).num_rows == 1
 
 
 def test_an_interrupted_writer_leaves_no_temporary_file(

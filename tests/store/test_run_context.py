@@ -15,7 +15,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.shipped import shipped
 from evoexp.store import manifest as module
-from evoexp.store.manifest import Difference, differences, environment, git_state, manifest
+from evoexp.store.manifest import git_state, manifest
 from evoexp.store.run_context import origin, run_context
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
@@ -128,18 +128,3 @@ def test_git_state_of_a_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 
     monkeypatch.setattr(subprocess, "run", absent)
     assert git_state.__wrapped__() == {"commit": None, "dirty": None}
-
-
-def test_differences() -> None:
-    assert differences(manifest("a" * 64), environment()) == []
-    versions, flags = {"numpy": "2.4.5", "gone": "1"}, {"features": ["avx", "avx2"]}
-    was = {"condition": "a", "versions": versions, "cpu": flags, "git": None}
-    versions, flags = {"numpy": "2.4.6"}, {"features": ["avx", "fma"]}
-    now = {"condition": "b", "versions": versions, "cpu": flags, "extra": {"x": 1}}
-    found = differences(was, now)
-    assert found == [
-        Difference("cpu.features", ["avx2"], ["fma"]),
-        Difference("versions.gone", "1", None),
-        Difference("versions.numpy", "2.4.5", "2.4.6"),
-    ]
-    assert str(found[2]) == "versions.numpy: was 2.4.5, now 2.4.6"

@@ -16,29 +16,23 @@ from store_samples import CONDITION, CONFIG
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash
 from evoexp.store.files import NUM_THREADS
 from evoexp.store.log import Finished
-from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, lock_all, resolve
 from store_lookup import find_runs
 
 HOLD = """
-    import itertools, sys, time
+    import sys, time
     from pathlib import Path
     from evoexp.store.run_directory import RunDirectory
     run = RunDirectory(Path(sys.argv[1]), sys.argv[2])
     with run.lock():
         print("held", flush=True)
-        if len(sys.argv) < 4:
-            time.sleep(1000)
-        content = Path(sys.argv[3]).read_bytes()
-        for replicate in itertools.cycle(range(0, 50, 10)):
-            run.write_logs({replicate: content})
-            run.write_logs(dict.fromkeys(range(replicate, replicate + 10), content))
+        time.sleep(1000)
 """
 
 
 @contextmanager
 def holder(*arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
-    """Have another process hold the lock of a run, and write a log again and again if named."""
+    """Have another process hold the lock of a run."""
     command = [sys.executable, "-c", textwrap.dedent(HOLD), *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None and process.stdout.readline() == "held\n"
@@ -76,16 +70,6 @@ def test_completion_is_the_file_itself(run: RunDirectory, add: Callable[..., Fin
     assert (run.completed(), run.failed()) == ({3, 5, 12345}, set())
 
 
-def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space"):
-        run.write_logs({0: b"x" * 1000})
-    assert os.listdir(run.replicates) == []
-
-
 @pytest.mark.parametrize("count", [1, 2, NUM_THREADS, 3 * NUM_THREADS])
 def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     run: RunDirectory, monkeypatch: pytest.MonkeyPatch, count: int
@@ -112,23 +96,6 @@ def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     assert synced == renamed and len(set(synced)) == count, "each file itself"
     assert events[-1] == ("sync", str(run.replicates)), "then their names"
     assert all(run.log_path(k).read_bytes() == bytes([k]) * 1000 for k in range(count))
-
-
-def test_killed_while_writing_leaves_whole_files(
-    run: RunDirectory, add: Callable[..., Finished], tmp_path: Path
-) -> None:
-    content, source = add(0).content, tmp_path / "source"
-    source.write_bytes(content)
-    for num_logs in (2, 17, 40):
-        with holder(tmp_path, CONDITION, source) as process:
-            while len(run.completed()) < num_logs:
-                assert process.poll() is None
-        assert all(run.log_path(k).read_bytes() == content for k in run.completed())
-    (run.replicates / ".0001.mcap.1.tmp").write_bytes(b"half")
-    (run.path / ".summary.parquet.1.tmp").write_bytes(b"half")
-    with run.lock():
-        assert not list(run.path.rglob("*.tmp"))
-    assert read_log(run.log_path(min(run.completed()))).config_json == CONFIG
 
 
 def test_the_lock_dies_with_its_process(run: RunDirectory, tmp_path: Path) -> None:

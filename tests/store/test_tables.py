@@ -123,21 +123,6 @@ def test_a_table_of_old_and_new_rows_is_that_of_all(
     assert [row["replicate"] for row in mixed.to_pylist()] == [*range(9), 11, 12]
 
 
-def test_a_table_whose_files_are_all_others_now_is_built_anew(run: RunDirectory, add: Add) -> None:
-    for k in range(3):
-        add(k, terms={"old": 1.0})
-    assert "term_old" in write_summary(run).column_names
-    for k in range(3):
-        add(k, best_cost=float(k))
-    table = write_summary(run)
-    assert table["best_cost"].to_pylist() == [0.0, 1.0, 2.0]
-    assert "term_old" not in table.column_names
-    for k in range(3):
-        run.log_path(k).unlink()
-    run.write_failure(0, "x", "")
-    assert write_summary(run)["status"].to_pylist() == ["failed"]
-
-
 def without_a_column(path: Path) -> None:
     pq.write_table(pq.read_table(path).drop_columns("solved"), path)
 

@@ -100,7 +100,7 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
     solid = solid_of(item)
     if isinstance(shape, coal.ConvexBase) and (balls := varied_spheres(solid, inflation, np.inf)):
         return _placed_balls(item, balls)
-    best = _column(item) if isinstance(shape, coal.Cylinder | coal.Cone) else None
+    best = _column(item, solid) if isinstance(shape, coal.Cylinder | coal.Cone) else None
     for counts in _lattices(solid.high - solid.low):
         balls = _cells(solid, counts)
         if best is None or balls.reach < best.reach:
@@ -167,15 +167,18 @@ def _in_a_row(item: Any, length: float, spacing: float) -> int:
     return int(np.ceil(length / spacing))
 
 
-def _column(item: Any) -> Balls:
+def _column(item: Any, solid: Solid) -> Balls:
     """Return spheres on the axis of a cylinder, or of one around a cone, one above the other."""
     radius, half = float(item.geometry.radius), float(item.geometry.halfLength)
     count = max(1, _in_a_row(item, half, radius))
     piece = half / count  # half of what a sphere covers
     around = float(np.sqrt(radius * radius + piece * piece))
     along = -half + piece * (2.0 * np.arange(count) + 1.0)
+    centers = np.column_stack([np.zeros((count, 2)), along])
     reach = max(around - radius, around - piece)
-    return Balls(np.column_stack([np.zeros((count, 2)), along]), np.full(count, around), reach)
+    if isinstance(item.geometry, coal.Cone):
+        reach = float(solid.far(centers).max()) + around
+    return Balls(centers, np.full(count, around), reach)
 
 
 def capsule_cover(item: Any) -> Cover:
@@ -199,6 +202,8 @@ def capsule_cover(item: Any) -> Cover:
     start[axis] -= half
     end[axis] += half
     reach = max(radius - 0.5 * float(across.min()), half + radius - 0.5 * edges[axis])
+    if not isinstance(shape, coal.Box | coal.Cylinder):  # by the ends: signed distances are convex
+        reach = float(solid.far(np.array([start, end])).max()) + float(radius)
     return Cover.placed(item, start[None], end[None], np.array([radius * WIDER]), reach)
 
 

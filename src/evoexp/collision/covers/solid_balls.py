@@ -66,12 +66,11 @@ def solid_of(item: Any) -> Solid:
         return Solid(-half, half, signed, signed)
     if isinstance(shape, coal.Cylinder | coal.Cone):
         half = np.array([shape.radius, shape.radius, shape.halfLength])
-        signed = functools.partial(_cylinder_distance, half=half[1:])
         if isinstance(shape, coal.Cylinder):
+            signed = functools.partial(_cylinder_distance, half=half[1:])
             return Solid(-half, half, signed, signed)
-        return Solid(
-            -half, half, signed, lambda points: np.maximum(_coal_distance(points, shape), 0)
-        )
+        heights = functools.partial(_cone_heights, radius=half[0], half=half[2])
+        return Solid(-half, half, heights, functools.partial(_farther, near=heights, shape=shape))
     if isinstance(shape, coal.Ellipsoid):
         half = np.array(shape.radii)
         return Solid(
@@ -97,12 +96,7 @@ def solid_of(item: Any) -> Solid:
     def near(points: FloatArray) -> FloatArray:
         return np.asarray((matrix_product(points, planes[:, :3].T) + planes[:, 3]).max(axis=1))
 
-    def far(points: FloatArray) -> FloatArray:
-        found: FloatArray = near(points)
-        outside = np.flatnonzero(found > 0.0)
-        found[outside] = np.maximum(found[outside], _coal_distance(points[outside], shape))
-        return found
-
+    far = functools.partial(_farther, near=near, shape=shape)
     return Solid(corners.min(axis=0), corners.max(axis=0), near, far, planes, hull.area)
 
 
@@ -115,6 +109,21 @@ def _box_distance(points: FloatArray, half: FloatArray) -> FloatArray:
 def _cylinder_distance(points: FloatArray, half: FloatArray) -> FloatArray:
     flat = np.column_stack([np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2), points[:, 2]])
     return _box_distance(flat, half)
+
+
+def _cone_heights(points: FloatArray, radius: float, half: float) -> FloatArray:
+    """Return how high points stand above the base or the side of a cone, whichever is more."""
+    across, z = np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2), points[:, 2]
+    edge = np.sqrt(radius * radius + 4.0 * half * half)
+    return np.asarray(np.maximum((2.0 * half * across + radius * (z - half)) / edge, -half - z))
+
+
+def _farther(points: FloatArray, near: Any, shape: Any) -> FloatArray:
+    """Return heights of points above a body's planes; of those outside, distances from it."""
+    found: FloatArray = near(points)
+    outside = np.flatnonzero(found > 0.0)
+    found[outside] = np.maximum(found[outside], _coal_distance(points[outside], shape))
+    return found
 
 
 def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:

@@ -177,11 +177,16 @@ def spread(typing_context: Any, value: Any) -> Any:
 @intrinsic
 def select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
     """Return the first value in lanes where a condition holds, the second in the others."""
+    kind = two if isinstance(two, _VectorType) else one
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.select(*arguments)
+        condition, *values = arguments
+        if isinstance(kind, _VectorType):
+            values = [_spread(builder, value, kind) for value in values]
+        return builder.select(condition, *values)
 
-    return one(condition, one, one), generate
+    kinds = (one, two) if isinstance(kind, _VectorType) else (kind, kind)
+    return kind(condition, *kinds), generate
 
 
 @intrinsic

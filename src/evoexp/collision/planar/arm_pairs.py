@@ -8,38 +8,36 @@ envelopes:
   each arm 1 and each block of eight arms 2 reach toward each other: where they end before they
   meet, no arm of the block can touch. That spares four of five tests of an arm and a block, at the
   price of a load and a comparison each, or once for eight arms and a block.
-- The others are tested one arm against a block: all pairs of lines by the signs of cross products
-  (in angles: the sines of Eq. 12), circles by squared distances.
-- What rounding leaves open is decided by `planar_arms.colliding`.
+- The others are tested one arm against a block, as `segment_predicates` says.
 
-So counts are the same whatever the vector width, and exact but for what rounding hides: lines and
-circles nearer than `segment_predicates.contact_tolerance` touch, parallel, collinear and vanishing
-ones, too.
+So counts are the same whatever the vector width: lines and circles nearer than
+`segment_predicates.contact_tolerance` touch, parallel, collinear and vanishing ones, too.
 """
 
-from typing import Any, NamedTuple
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.planar.planar_arms import (
-    POINT_ROWS,
-    Arm,
-    Bounds,
-    bounds_of,
-    colliding,
-    tolerance_of,
+from evoexp.collision.planar.planar_arms import POINT_ROWS, Arm, tolerance_of
+from evoexp.collision.planar.segment_predicates import (
+    Line,
+    meeting,
+    sign_product,
+    squared_distance,
 )
-from evoexp.collision.planar.segment_predicates import Line, sign_product, squared_from_link
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
     Mask,
+    Number,
     Vector,
     any_lane,
     load,
     lower,
+    magnitude,
     select,
     spread,
     store,
@@ -50,6 +48,11 @@ from evoexp.robots.kinematics import U
 
 MOST_CONFIGURATIONS = 32767  # counts are int16
 LARGEST = 1e70  # [length unit] of coordinates: products of four do not overflow
+MARGIN = 2.0**-40
+"""Of the greatest distance, added to reaches, whose sums of at most six numbers are rounded."""
+
+Links = tuple[Line, Line]
+"""Lines of both links of an arm, or of eight."""
 
 
 class Crossings(NamedTuple):
@@ -121,11 +124,10 @@ def count_pairs(
     Outlines (K, 4 | 8, N1) and (K, 4 | 8, N2) are finite, and hold directions if an arm has an
     envelope; the tolerance is that of `tolerance_of`.
     """
-    bounds = bounds_of(arm_1, arm_2, tolerance)
+    bounds = _bounds_of(arm_1, arm_2, tolerance)
     one, two = _population(arm_1, outlines_1, 1.0), _population(arm_2, outlines_2, -1.0)
     num_1, num_2, num_configurations = len(sums_1), len(sums_2), outlines_1.shape[0]
-    # eight rows of certain collisions, one per arm 1, then eight of possible ones
-    tally = np.empty(2 * LANES * two.width)
+    tally = np.empty(LANES * two.width)  # a row per arm 1
     sums_2[:] = 0
     for first in range(0, num_1, LANES):
         count = min(LANES, num_1 - first)
@@ -134,21 +136,41 @@ def count_pairs(
         for begin in range(0, two.width, LANES):
             _test_block(one, first, count, two, begin, num_configurations, bounds, tally)
         for r in range(count):
-            certain, possible, i = U(r * two.width), U((r + LANES) * two.width), U(first + r)
+            i, total = U(first + r), 0
             for n in range(num_2):
-                counts[i, U(n)] = np.int16(tally[certain + U(n)])
-            for n in range(num_2):
-                if tally[certain + U(n)] != tally[possible + U(n)]:  # rounding leaves it open
-                    total = 0
-                    for k in range(num_configurations):
-                        total += colliding(
-                            arm_1, outlines_1, first + r, arm_2, outlines_2, n, k, tolerance
-                        )
-                    counts[i, U(n)] = total
-            sums_1[i] = 0
-            for n in range(num_2):
-                sums_1[i] += counts[i, U(n)]
-                sums_2[U(n)] += counts[i, U(n)]
+                hits = np.int16(tally[U(r * two.width + n)])
+                counts[i, U(n)] = hits
+                sums_2[U(n)] += hits
+                total += hits
+            sums_1[i] = total
+
+
+class Bounds(NamedTuple):
+    """Bounds of what touches."""
+
+    tolerance: float  # `contact_tolerance` of both arms [length unit]
+    margin: float  # distance of reaches above which nothing touches [length unit]
+    doubt: float  # sign products of lines that are nearer to 0 are left open [length unit⁴]
+
+
+@kernel
+def _bounds_of(arm_1: Arm, arm_2: Arm, tolerance: float) -> Bounds:
+    """Return the bounds of two arms.
+
+    With bases d apart, links ≤ l, half widths and radii of sum h, D = d + 3 l + h is the greatest
+    distance. A line function, the cross product of a link and a vector to an end of the other, is
+    at most l D; the tolerance t moves it by l t, and so the product of two by l² (2 D t + t²).
+    Rounding moves the product by less than 16 · 2^-53 l² D², which is less than l² D t.
+    """
+    (x_1, y_1), (x_2, y_2) = arm_1.base, arm_2.base
+    apart = math.sqrt((x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1))
+    reach = (arm_1.half_width + arm_2.half_width) + (arm_1.tcp_radius + arm_2.tcp_radius)
+    (first, second), (third, fourth) = arm_1.lengths, arm_2.lengths
+    longest = max(max(first, second), max(third, fourth)) + tolerance  # with rounded ends
+    most = apart + 3.0 * longest + reach
+    # contact counts twice: along x ± y, whose unit is √2
+    margin = 2.0 * (tolerance + reach) + MARGIN * most
+    return Bounds(tolerance, margin, 4.0 * longest * longest * most * tolerance)
 
 
 @kernel
@@ -225,25 +247,17 @@ def _test_block(
         for r in range(U(0), U(count), U(1)):
             if any_lane(load(one.reaches, (U(first) + r) * size + at) < least):
                 continue  # an axis separates this one from all
-            links_1 = _links(arm_1.base[0], arm_1.base[1], *_numbers(one, own + r))
-            links_2 = _links(x, y, *_vectors(two, other))
-            circles = spread(np.inf)
+            ends_1, ends_2 = _numbers(one, own + r), _vectors(two, other)
+            links_1 = (arm_1.base[0], arm_1.base[1], ends_1[0], ends_1[1]), ends_1
+            links_2 = (x, y, ends_2[0], ends_2[1]), ends_2
             if enveloped:
                 turns_1 = _numbers(one, own + r + U(POINT_ROWS * one.width))
                 turns_2 = _vectors(two, other + U(POINT_ROWS * two.width))
-                lines = _boundary_products(arm_1, links_1, turns_1, arm_2, links_2, turns_2)
-                circles = _circle_distances(arm_1, links_1, turns_1, arm_2, links_2, turns_2)
+                hits = _envelopes_touch(arm_1, links_1, turns_1, arm_2, links_2, turns_2, bounds)
             else:
-                lines = _sign_products(links_1, links_2)
-            hits = (lines < -bounds.lines) | (circles < -bounds.circles)
-            near = (lines <= bounds.lines) | (circles <= bounds.circles)
-            _add_where(hits, tally, r * U(two.width) + column)
-            _add_where(near, tally, (r + lanes) * U(two.width) + column)
-
-
-@inlined
-def _links(base_x: Any, base_y: Any, x: Any, y: Any, tip_x: Any, tip_y: Any) -> tuple[Line, Line]:
-    return (base_x, base_y, x - base_x, y - base_y), (x, y, tip_x - x, tip_y - y)
+                hits = _links_touch(links_1, links_2, bounds)
+            place = r * U(two.width) + column
+            store(tally, place, load(tally, place) + select(hits, spread(1.0), 0.0))
 
 
 @inlined
@@ -262,72 +276,76 @@ def _vectors(two: Population, at: np.uint64) -> Line:
 
 
 @inlined
-def _sign_products(one: tuple[Line, Line], two: tuple[Line, Line]) -> Vector:
-    """Return the least sign product of the four pairs of lines."""
+def _links_touch(one: Links, two: Links, bounds: Bounds) -> Mask:
+    """Return whether a line of one arm meets one of another."""
     (first, second), (third, fourth) = one, two
     least = lower(sign_product(first, third), sign_product(first, fourth))
-    return lower(least, lower(sign_product(second, third), sign_product(second, fourth)))
+    least = lower(least, lower(sign_product(second, third), sign_product(second, fourth)))
+    hits = least < -bounds.doubt
+    if any_lane(magnitude(least) <= bounds.doubt):  # rounding leaves it open
+        hits = hits | _links_meet(one, two, bounds.tolerance)
+    return hits
+
+
+@kernel
+def _links_meet(one: Links, two: Links, tolerance: float) -> Mask:
+    (first, second), (third, fourth) = one, two
+    hits = meeting(first, third, tolerance) | meeting(first, fourth, tolerance)
+    return hits | meeting(second, third, tolerance) | meeting(second, fourth, tolerance)
 
 
 @inlined
-def _boundary_products(
+def _envelopes_touch(
     arm_1: Arm,
-    one: tuple[Line, Line],
+    one: Links,
     turns_1: Line,
     arm_2: Arm,
-    two: tuple[Line, Line],
+    two: Links,
     turns_2: Line,
-) -> Vector:
-    """Return the least sign product of the boundary lines of two arms, or of links without such."""
-    least, half_1, half_2 = spread(np.inf), arm_1.half_width, arm_2.half_width
-    for side_1 in range(2 if half_1 > 0.0 else 1):
-        first = _beside(one, turns_1, (2 * side_1 - 1) * half_1)
-        for side_2 in range(2 if half_2 > 0.0 else 1):
-            second = _beside(two, turns_2, (2 * side_2 - 1) * half_2)
-            least = lower(least, _sign_products(first, second))
-    return least
+    bounds: Bounds,
+) -> Mask:
+    """Return whether a boundary line or the circle of one arm meets one of another.
+
+    Turns are the directions of both links.
+    """
+    tip_1, tip_2 = (one[1][2], one[1][3]), (two[1][2], two[1][3])
+    x, y = tip_2[0] - tip_1[0], tip_2[1] - tip_1[1]
+    hits = _is_near(x * x + y * y, arm_1.tcp_radius + arm_2.tcp_radius, bounds.tolerance)
+    for side_1 in range(2 if arm_1.half_width > 0.0 else 1):
+        lines_1 = _beside(one, turns_1, (2 * side_1 - 1) * arm_1.half_width)
+        hits = hits | _meets_circle(lines_1, tip_2, arm_2.tcp_radius, bounds.tolerance)
+        for side_2 in range(2 if arm_2.half_width > 0.0 else 1):
+            lines_2 = _beside(two, turns_2, (2 * side_2 - 1) * arm_2.half_width)
+            hits = hits | _links_touch(lines_1, lines_2, bounds)
+            if side_1 == 0:
+                hits = hits | _meets_circle(lines_2, tip_1, arm_1.tcp_radius, bounds.tolerance)
+    return hits
 
 
 @inlined
-def _beside(links: tuple[Line, Line], turns: Line, shift: float) -> tuple[Line, Line]:
-    """Return lines parallel to links."""
-    (x, y, u, v), (elbow_x, elbow_y, w, z), (c, s, d, t) = links[0], links[1], turns
-    second = (elbow_x - shift * t, elbow_y + shift * d, w, z)
-    return (x - shift * s, y + shift * c, u, v), second
+def _beside(links: Links, turns: Line, shift: float) -> Links:
+    """Return lines parallel to links; to the left of them where the shift is positive."""
+    first, second = links
+    return _shifted(first, turns[0], turns[1], shift), _shifted(second, turns[2], turns[3], shift)
 
 
 @inlined
-def _circle_distances(
-    arm_1: Arm,
-    one: tuple[Line, Line],
-    turns_1: Line,
-    arm_2: Arm,
-    two: tuple[Line, Line],
-    turns_2: Line,
-) -> Vector:
-    """Return the least squared distance, less radius², of circles from lines and each other."""
-    (x_1, y_1, u, v), (x_2, y_2, w, z) = one[1], two[1]
-    x_1, y_1, x_2, y_2 = x_1 + u, y_1 + v, x_2 + w, y_2 + z  # the tips
-    both = arm_1.tcp_radius + arm_2.tcp_radius
-    between = (x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1) - both * both
-    of_second = _circle_distance(arm_1, one, turns_1, x_2, y_2, arm_2.tcp_radius)
-    of_first = _circle_distance(arm_2, two, turns_2, x_1, y_1, arm_1.tcp_radius)
-    return lower(between, lower(of_second, of_first))
+def _shifted(line: Line, cosine: Number, sine: Number, shift: float) -> Line:
+    x, y = shift * sine, shift * cosine
+    return line[0] - x, line[1] + y, line[2] - x, line[3] + y
 
 
 @inlined
-def _circle_distance(
-    arm: Arm, links: tuple[Line, Line], turns: Line, x: Vector, y: Vector, radius: float
-) -> Vector:
-    """Return the squared distance, less radius², of a circle around (x, y) from an arm's lines."""
-    (elbow_x, elbow_y, _, _), (c, s, d, t), half = links[1], turns, arm.half_width
-    one = squared_from_link(x - links[0][0], y - links[0][1], c, s, arm.lengths[0], half)
-    two = squared_from_link(x - elbow_x, y - elbow_y, d, t, arm.lengths[1], half)
-    return lower(one, two) - radius * radius
+def _meets_circle(
+    lines: Links, center: tuple[Number, Number], radius: float, tolerance: float
+) -> Mask:
+    """Return whether a line of an arm meets a circle."""
+    one = squared_distance(lines[0], center[0], center[1])
+    two = squared_distance(lines[1], center[0], center[1])
+    return _is_near(lower(one, two), radius, tolerance)
 
 
 @inlined
-def _add_where(condition: Mask, tally: FloatArray, place: np.uint64) -> None:
-    """Add 1 to the numbers of a vector where a condition holds."""
-    more: Vector = select(condition, spread(1.0), spread(0.0))
-    store(tally, place, load(tally, place) + more)
+def _is_near(squared: Vector, radius: float, tolerance: float) -> Mask:
+    """Return whether a squared distance from the centre of a circle is in it; of radius 0: none."""
+    return squared <= ((radius + tolerance) * (radius + tolerance) if radius > 0.0 else -1.0)

@@ -9,12 +9,11 @@ Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, 
 Lines need the first four rows only.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.segment_predicates import contact_tolerance, meeting, squared_distance
+from evoexp.collision.planar.segment_predicates import contact_tolerance, meeting
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import exact_sincos
 from evoexp.records import BoolArray, FloatArray
@@ -24,10 +23,6 @@ Point = tuple[float, float]
 
 POINT_ROWS, OUTLINE_ROWS = 4, 8
 PARALLEL = 1e-12  # [-] links are parallel up to this sine of the angle between them
-
-_UNIT = 2.0**-53  # half a unit in the last place of 1
-_MARGIN = 2.0**-40
-"""Of the greatest distance, added to reaches, whose sums of at most six numbers are rounded."""
 
 
 class Arm(NamedTuple):
@@ -126,111 +121,11 @@ def tolerance_of(arm_1: Arm, arm_2: Arm) -> float:
     return contact_tolerance(max(largest_coordinate(arm_1), largest_coordinate(arm_2)))
 
 
-class Bounds(NamedTuple):
-    """Bounds on rounding: what is nearer to 0 is left open."""
-
-    margin: float  # distance of reaches above which nothing touches [length unit]
-    lines: float  # of the sign products of lines [length unit⁴]
-    circles: float  # of squared distances [length unit²]
-
-
-@kernel
-def bounds_of(arm_1: Arm, arm_2: Arm, tolerance: float) -> Bounds:
-    """Return the bounds on rounding.
-
-    With bases d apart, links ≤ l, half widths and radii of sum h, D = d + 3 l + h is the greatest
-    distance. Let u = 2^-53.
-
-    Lines: a line function, the cross product of a link and a vector to an end of the other, is at
-    most V = l D. Its error is below 4 u V at the other's beginning: the vectors (2 u), their
-    products and the difference. At its end the links' own cross product is added, which is at most
-    V / 3: 7 u V. So the product of two errs by less than (4 + 7 + 1) u V² + 28 u² V²; taken are 16.
-
-    Circles: distances from a link err by less than 10 u D: the unit vectors' products (4 u), and
-    sums; a sum of two squares by less than 32 u D² (40 taken).
-
-    What counts as contact, or is lost in coordinates, moves distances by the tolerance t, and so
-    their products by 2 D t + t². What underflows is 0, and so left open.
-    """
-    (x_1, y_1), (x_2, y_2) = arm_1.base, arm_2.base
-    apart = math.sqrt((x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1))
-    reach = (arm_1.half_width + arm_2.half_width) + (arm_1.tcp_radius + arm_2.tcp_radius)
-    (first, second), (third, fourth) = arm_1.lengths, arm_2.lengths
-    longest = max(max(first, second), max(third, fourth)) + tolerance  # with rounded ends
-    most = apart + 3.0 * longest + reach
-    moved, square = tolerance * (2.0 * most + tolerance), _UNIT * most * most
-    return Bounds(
-        # twice: along x ± y, whose unit is sqrt 2
-        2.0 * (tolerance + reach) + _MARGIN * most,
-        longest * longest * (16.0 * square + moved),
-        40.0 * square + moved,
-    )
-
-
 @kernel
 def largest_coordinate(arm: Arm) -> float:
     """Return the greatest coordinate that an arm can reach [length unit]."""
     (x, y), (first, second) = arm.base, arm.lengths
     return max(abs(x), abs(y)) + first + second + (arm.half_width + arm.tcp_radius)
-
-
-@kernel
-def boundary(
-    arm: Arm, outlines: FloatArray, k: int, n: int, line: int
-) -> tuple[float, float, float, float]:
-    """Return the ends (x, y, x, y) of a line: right and left of the first link, then the second."""
-    link, x, y = line, 0.0, 0.0
-    if arm.half_width > 0.0:
-        link, side = line // 2, 2.0 * (line % 2) - 1.0
-        c, s = outlines[k, 4 + 2 * link, n], outlines[k, 5 + 2 * link, n]
-        x, y = -(side * arm.half_width * s), side * arm.half_width * c
-    elbow_x, elbow_y = outlines[k, 0, n], outlines[k, 1, n]
-    if link == 0:
-        return arm.base[0] + x, arm.base[1] + y, elbow_x + x, elbow_y + y
-    return elbow_x + x, elbow_y + y, outlines[k, 2, n] + x, outlines[k, 3, n] + y
-
-
-@kernel
-def colliding(
-    arm_1: Arm,
-    outlines_1: FloatArray,
-    i: int,
-    arm_2: Arm,
-    outlines_2: FloatArray,
-    j: int,
-    k: int,
-    tolerance: float,
-) -> bool:
-    """Return whether two individuals are at most a tolerance apart in configuration k."""
-    radius_1, radius_2 = arm_1.tcp_radius, arm_2.tcp_radius
-    # an arm's links, or two boundary lines for each of them
-    num_1, num_2 = 4 if arm_1.half_width > 0.0 else 2, 4 if arm_2.half_width > 0.0 else 2
-    # circle against circle
-    cx, cy = outlines_1[k, 2, i], outlines_1[k, 3, i]
-    fx, fy = outlines_2[k, 2, j], outlines_2[k, 3, j]
-    if _near((fx - cx) * (fx - cx) + (fy - cy) * (fy - cy), radius_1 + radius_2, tolerance):
-        return True
-    # lines of arm 1 against the circle and the lines of arm 2
-    for one in range(num_1):
-        ax, ay, bx, by = boundary(arm_1, outlines_1, k, i, one)
-        if _near(squared_distance(ax, ay, bx, by, fx, fy), radius_2, tolerance):
-            return True
-        for two in range(num_2):
-            dx, dy, ex, ey = boundary(arm_2, outlines_2, k, j, two)
-            if meeting(ax, ay, bx, by, dx, dy, ex, ey, tolerance):
-                return True
-    # lines of arm 2 against the circle of arm 1
-    for two in range(num_2):
-        dx, dy, ex, ey = boundary(arm_2, outlines_2, k, j, two)
-        if _near(squared_distance(dx, dy, ex, ey, cx, cy), radius_1, tolerance):
-            return True
-    return False
-
-
-@kernel
-def _near(squared: float, radius: float, tolerance: float) -> bool:
-    """Return whether a squared distance from the centre of a circle is in it; of radius 0: none."""
-    return radius > 0.0 and squared <= (radius + tolerance) * (radius + tolerance)
 
 
 class ClosedForm(NamedTuple):
@@ -303,4 +198,4 @@ def _write_crossings(
         for n in range(crossing.shape[1]):
             (ax, ay), (bx, by) = one[i, :, n], one[i + 1, :, n]
             (cx, cy), (dx, dy) = two[j, :, n], two[j + 1, :, n]
-            crossing[pair, n] = meeting(ax, ay, bx, by, cx, cy, dx, dy, tolerance)
+            crossing[pair, n] = meeting((ax, ay, bx, by), (cx, cy, dx, dy), tolerance)

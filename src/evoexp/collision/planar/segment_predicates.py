@@ -6,13 +6,11 @@ is at most a tolerance apart as contact; `contact_tolerance` bounds that roundin
 of the sides in `meeting`: where a side is in doubt, an end is nearer to a line than the tolerance.
 """
 
-from typing import Any
-
 from evoexp.numeric.compilation import inlined, kernel
-from evoexp.numeric.vectors import Vector, magnitude, spread, upper
+from evoexp.numeric.vectors import Mask, Number, lower, select, upper
 
-Line = tuple[Any, Any, Any, Any]
-"""Where lines begin, x and y, and from there to their ends: of one arm (numbers) or of eight."""
+Line = tuple[Number, Number, Number, Number]
+"""Both ends of a segment, x and y: of one arm (numbers) or of eight (vectors)."""
 
 ROUNDING = 2.0**-46
 """`contact_tolerance` of coordinates up to 1 [-]."""
@@ -39,78 +37,50 @@ def contact_tolerance(size: float) -> float:
     return ROUNDING * size
 
 
-@kernel
-def meeting(
-    ax: float,
-    ay: float,
-    bx: float,
-    by: float,
-    cx: float,
-    cy: float,
-    dx: float,
-    dy: float,
-    tolerance: float,
-) -> bool:
-    """Return whether the segments ab and cd cross, or are at most `tolerance` apart.
+@inlined
+def meeting(one: Line, two: Line, tolerance: float) -> Mask:
+    """Return whether two segments cross, or are at most `tolerance` apart.
 
     They cross if the ends of each lie on both sides of the other's line. Segments on one line have
     rounded sides; those that do not touch are told apart by the boxes around them.
     """
-    if (
-        min(ax, bx) <= max(cx, dx)
-        and min(cx, dx) <= max(ax, bx)
-        and min(ay, by) <= max(cy, dy)
-        and min(cy, dy) <= max(ay, by)
-        and _parts(ax, ay, bx, by, cx, cy, dx, dy)
-        and _parts(cx, cy, dx, dy, ax, ay, bx, by)
-    ):
-        return True
+    (ax, ay, bx, by), (cx, cy, dx, dy) = one, two
+    overlap = (lower(ax, bx) <= upper(cx, dx)) & (lower(cx, dx) <= upper(ax, bx))
+    overlap = overlap & (lower(ay, by) <= upper(cy, dy)) & (lower(cy, dy) <= upper(ay, by))
+    crossing = overlap & _parts(one, two) & _parts(two, one)
     # segments that do not cross are nearest to each other at an end
-    least = min(
-        min(squared_distance(ax, ay, bx, by, cx, cy), squared_distance(ax, ay, bx, by, dx, dy)),
-        min(squared_distance(cx, cy, dx, dy, ax, ay), squared_distance(cx, cy, dx, dy, bx, by)),
+    least = lower(
+        lower(squared_distance(one, cx, cy), squared_distance(one, dx, dy)),
+        lower(squared_distance(two, ax, ay), squared_distance(two, bx, by)),
     )
-    return least <= tolerance * tolerance
+    return crossing | (least <= tolerance * tolerance)
 
 
-@kernel
-def _parts(
-    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
-) -> bool:
-    """Return whether c and d lie on different sides of the line ab."""
+@inlined
+def _parts(line: Line, other: Line) -> Mask:
+    """Return whether the ends of the other lie on different sides of a line."""
+    (ax, ay, bx, by), (cx, cy, dx, dy) = line, other
     ux, uy = bx - ax, by - ay
     one = ux * (cy - ay) - uy * (cx - ax)
     two = ux * (dy - ay) - uy * (dx - ax)
-    return (one > 0.0 and two < 0.0) or (one < 0.0 and two > 0.0)
-
-
-@kernel
-def squared_distance(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> float:
-    """Return the squared distance of the point (x, y) from the segment ab, rounded."""
-    ux, uy, x, y = bx - ax, by - ay, x - ax, y - ay
-    squared = ux * ux + uy * uy
-    t = min(max((ux * x + uy * y) / (squared if squared > 0.0 else 1.0), 0.0), 1.0)
-    x, y = x - t * ux, y - t * uy
-    return x * x + y * y
+    return ((one > 0.0) & (two < 0.0)) | ((one < 0.0) & (two > 0.0))
 
 
 @inlined
-def sign_product(one: Line, two: Line) -> Vector:
-    """Return a number < 0 if the ends of each line are on both sides of the other, else ≥ 0."""
-    (x, y, u, v), (x_2, y_2, w, z) = one, two
-    dx, dy, across = x_2 - x, y_2 - y, u * z - v * w
-    first, second = u * dy - v * dx, w * dy - z * dx
+def squared_distance(line: Line, x: Number, y: Number) -> Number:
+    """Return the squared distance of the point (x, y) from a segment, rounded."""
+    ax, ay, bx, by = line
+    ux, uy, vx, vy = bx - ax, by - ay, x - ax, y - ay
+    squared, along = ux * ux + uy * uy, ux * vx + uy * vy
+    t = lower(upper(along / select(squared > 0.0, squared, 1.0), 0.0), 1.0)
+    vx, vy = vx - t * ux, vy - t * uy
+    return vx * vx + vy * vy
+
+
+@inlined
+def sign_product(one: Line, two: Line) -> Number:
+    """Return a number < 0 if the ends of each segment are on both sides of the other, else ≥ 0."""
+    (ax, ay, bx, by), (cx, cy, dx, dy) = one, two
+    ux, uy, vx, vy, x, y = bx - ax, by - ay, dx - cx, dy - cy, cx - ax, cy - ay
+    first, second, across = ux * y - uy * x, vx * y - vy * x, ux * vy - uy * vx
     return upper(first * (first + across), second * (second + across))
-
-
-@inlined
-def squared_from_link(
-    x: Vector, y: Vector, c: Vector, s: Vector, length: float, half_width: float
-) -> Vector:
-    """Return the squared distance of points from the nearer of a link's boundary lines.
-
-    Points are seen from the link's beginning; c and s are cosine and sine of its direction.
-    """
-    along, off = c * x + s * y, magnitude(c * y - s * x) - half_width
-    out = upper(upper(0.0 - along, along - length), spread(0.0))
-    return off * off + out * out

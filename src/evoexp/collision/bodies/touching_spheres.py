@@ -65,7 +65,7 @@ class TouchingSpheres(Component):
         arms, moving, centers = self._placed(assembly)
         radii, table = np.full(len(arms), self.sphere_radius), assembly.table
         local = np.array([table.local(*sphere) for sphere in zip(moving, centers, strict=True)])
-        spheres, of_arms = Spheres(moving - 1, local, self.sphere_radius), _ranges(arms)
+        radius, of_arms = self.sphere_radius, _ranges(arms)
         # the general model: bodies of different arms against each other, and against obstacles
         arm_of = dict(zip(moving.tolist(), arms.tolist(), strict=True))
         between = [(j, k) for j, k in itertools.combinations(arm_of, 2) if arm_of[j] != arm_of[k]]
@@ -76,11 +76,11 @@ class TouchingSpheres(Component):
         # the planar one, of links as lines of circles
         of_links = _ranges(np.cumsum(np.diff(moving, prepend=moving[0]) != 0))
         arm_links = _ranges(arms[of_links[:, 0]])
-        lines = link_lines(table.chain, *spheres, of_links, arm_links)
+        lines = link_lines(table.chain, moving - 1, local, radius, of_links, arm_links)
         if not table.planar or len(around.kind):
             lines = lines._replace(scale=np.inf)
         tables = CircleTables(table.chain, lines, general.tables)
-        return SphereCollision(assembly, spheres, shapes, of_arms, around, general, tables)
+        return SphereCollision(assembly, radius, shapes, of_arms, around, general, tables)
 
     def _placed(self, assembly: Assembly) -> tuple[IntArray, IntArray, FloatArray]:
         """Return arm, joint and centre (3,) of each sphere on the links that move.
@@ -118,20 +118,12 @@ def _ranges(owners: IntArray) -> IntArray:
     )
 
 
-class Spheres(NamedTuple):
-    """Spheres of one size, fixed to joints."""
-
-    joint: IntArray  # (spheres,) index into the kinematic table, arm by arm
-    local: FloatArray  # (spheres, 3) centres in the table's frames [length unit]
-    radius: float  # of every sphere [length unit]
-
-
 class SphereCollision(NamedTuple):
     """Touching spheres on one robot, and the obstacles around it."""
 
     assembly: Assembly  # the robot
-    spheres: Spheres  # the spheres
-    shapes: Shapes  # the same in the frames of Pinocchio's joints
+    radius: float  # of every sphere [length unit]
+    shapes: Shapes  # the spheres
     arm_spheres: IntArray  # (arms, 2) first and one-past-last sphere of each arm
     obstacles: ObstacleTable  # the obstacle table
     general: BodyCollision  # the same spheres in the model of spheres and capsules
@@ -147,10 +139,11 @@ class SphereCollision(NamedTuple):
     def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
         q = DEGREE * contiguous_batch(q, self.general.nq)
-        chain, pose = self.assembly.table.chain, np.empty((12, q.shape[1]))
-        centers = np.empty((len(self.spheres.joint), 3, q.shape[1]))
-        for k, (joint, local) in enumerate(zip(*self.spheres[:2], strict=True)):
-            frame_poses(chain, joint, np.append(np.eye(3), local), q, pose)
+        table, pose = self.assembly.table, np.empty((12, q.shape[1]))
+        centers = np.empty((len(self.shapes.joint), 3, q.shape[1]))
+        for k, (joint, center) in enumerate(zip(*self.shapes[:2], strict=True)):
+            local = np.append(np.eye(3), table.local(joint, center))
+            frame_poses(table.chain, joint - 1, local, q, pose)
             centers[k] = pose[9:]
         squares = np.full(q.shape[1], np.inf)
         for (first, stop), (begin, end) in itertools.combinations(self.arm_spheres, 2):
@@ -164,8 +157,7 @@ class SphereCollision(NamedTuple):
                 kind, size, matrix_product(points, rotation.reshape(3, 3))
             )
             outside = np.minimum(outside, distances.min(axis=0))
-        radius = self.spheres.radius
-        return Clearances(outside - radius, np.sqrt(squares) - 2.0 * radius)
+        return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,): where `clearance` is negative."""

@@ -42,7 +42,7 @@ class Problem(ArmProblem):
     @property
     def sphere_radius(self) -> float:
         """Radius of the circles or spheres that approximate the links [length unit]."""
-        return self._spheres.spheres.radius
+        return self._spheres.radius
 
     @property
     def _spheres(self) -> SphereCollision:

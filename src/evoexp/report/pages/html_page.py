@@ -93,8 +93,8 @@ def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[dict[
     def place(heading: str, table: Table | None) -> dict[str, Any]:
         cells = (cell for row in table.rows for cell in row) if table else ()
         verdicts = verdict_counts(cell.text for cell in cells if isinstance(cell, Verdict))
-        own = {"heading": heading, "anchor": anchor(heading), "table": table, "figures": []}
-        return own | {"verdicts": verdicts}
+        own: dict[str, Any] = {"heading": heading, "anchor": anchor(heading), "table": table}
+        return own | {"verdicts": verdicts, "figures": []}
 
     yield from (place(table.heading, table) for table in document.results)
     if document.figures:

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,17 @@ def made_up(experiment: Experiment, columns: Callable[[str], dict[str, Any]]) ->
         rows = pd.DataFrame(columns(label))
         found.append(ConditionResults(label, condition, len(rows), rows, {}, None, {}))
     return Results(experiment.name, experiment.budget, tuple(found))
+
+
+def shown_run(
+    label: str, hash12: str, costs: Sequence[float], reasons: Sequence[str] = ()
+) -> ConditionResults:
+    """Return a run whose certified replicates have these costs; the others failed."""
+    condition: Any = SimpleNamespace(id=hash12.ljust(64, "0"), seed=0, is_reference=False)
+    rows = pd.DataFrame({"best_cost": costs, "certified": [True] * len(costs)})
+    failures = dict(enumerate(reasons, len(costs)))
+    run = RunDirectory(Path("outputs"), condition.id)
+    return ConditionResults(label, condition, len(rows), rows, failures, run, {})
 
 
 def made_up_runs(

@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import pytest
-from test_html_page import ID, PLAIN, RANA, RUN, summary
+from test_html_page import PLAIN, RANA, RUN, summary
 
 from chromium import NEEDS_BROWSER, Browser
 from chromium import browser as browser
 from evoexp.report.pages.home_page import home_page
 from evoexp.report.pages.html_page import html_page
-from evoexp.report.pages.page_parts import Figures, FigureText, RunText, Table
+from evoexp.report.pages.page_parts import Table
 from report_samples import smoke_report
 
 pytestmark = [*NEEDS_BROWSER, pytest.mark.matrix]
@@ -24,9 +24,8 @@ PICTURE = (
 def opened(browser: Browser, tmp_path: Path) -> Browser:
     """Open a page of one table and one figure."""
     rows = tuple((f"row {k}", cell) for k, cell in enumerate(("10 [1, 2]", "−3", "–", "9", "∞")))
-    figures = Figures((FigureText("figure", "title", "caption", ("svg",)),))
-    sections, runs = (Table("Results", ("a", "b"), rows), figures), RunText("x", ID, 1, 0, False)
-    text = PLAIN._replace(sections=sections, runs=(runs,))
+    results = (Table("Results", ("a", "b"), rows),)
+    text = PLAIN._replace(results=results, appendix=(), formats=("svg",), players={})
     (tmp_path / "figure.svg").write_bytes(PICTURE)
     (tmp_path / "index.html").write_bytes(html_page(text, {"figure.svg": PICTURE}))
     browser.look(1280, 900)

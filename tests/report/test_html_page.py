@@ -3,7 +3,9 @@
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from evoexp.report.pages import markdown
 from evoexp.report.pages.home_page import (
@@ -15,17 +17,9 @@ from evoexp.report.pages.home_page import (
     site,
 )
 from evoexp.report.pages.html_page import html_page, inline, number_columns, verdict_counts
-from evoexp.report.pages.page_parts import (
-    Document,
-    Figures,
-    FigureText,
-    Player,
-    RunText,
-    Table,
-    Verdict,
-)
+from evoexp.report.pages.page_parts import Document, Drawing, PlayedRun, Player, Table, Verdict
 from html_reader import Page, markdown_tables
-from report_samples import smoke_report
+from report_samples import shown_run, smoke_report
 
 HOSTILE = (
     "<script>alert(1)</script>",
@@ -36,7 +30,6 @@ HOSTILE = (
     "<!-- & &lt; &amp;lt;",
 )
 HASH = "0123456789ab"
-ID = HASH + "0" * 52
 LOGS = (
     (0, f"../../runs/{HASH}/replicates/0000.mcap", "162.8, certified"),
     (1, f"../../runs/{HASH}/replicates/0001.failed.json", "failed"),
@@ -46,14 +39,20 @@ PLAYER = Player("GA", "motion_1.html")
 
 def page_of(text: str) -> Document:
     """Return a page on which nothing is told but one text."""
-    sections = (
-        Table(text, (text, "n"), ((text, 1), (f"`{text}`", 2)), text),
-        Table("Claims", ("claim", "verdict"), ((text, Verdict("reproduced")),)),
-        Figures((FigureText("figure", text, text, ("svg", "png"), (PLAYER,)),)),
-        Table("Failures", ("condition", "replicate", "reason"), ((text, 0, text),)),
+    run = shown_run(text, HASH, (162.8,), ("failed",))
+    plays = (PlayedRun(run, 0),)
+    return Document(
+        *(text, f"evoexp report {text}", text, text, (("Partial results", text),), text),
+        (
+            Table(text, (text, "n"), ((text, 1), (f"`{text}`", 2)), text),
+            Table("Claims", ("claim", "verdict"), ((text, Verdict("reproduced")),)),
+        ),
+        (Drawing("figure", text, text, pd.DataFrame, Figure, (run,), plays),),
+        (Table("Failures", ("condition", "replicate", "reason"), ((text, 0, text),)),),
+        (run,),
+        formats=("svg", "png"),
+        players={plays[0].key: PLAYER},
     )
-    runs, notice = (RunText(text, ID, 1, 1, False, LOGS),), (("Partial results", text),)
-    return Document(text, f"evoexp report {text}", text, text, notice, text, sections, runs)
 
 
 PLAIN = page_of("plain")
@@ -108,7 +107,7 @@ def test_codes_that_name_a_run_of_the_page_link_to_its_commands() -> None:
 
 def test_heads_that_name_a_condition_link_to_its_run() -> None:
     table = Table("Results", ("quantity", "GA (n\u00a0=\u00a020)", "GA 2"), (("GA", "GA", 1),))
-    page = read(PLAIN._replace(sections=(table,), runs=(RunText("GA", ID, 1, 0, False),)))
+    page = read(PLAIN._replace(results=(table,), figures=(), runs=(shown_run("GA", HASH, (1.0,)),)))
     links = [e.text for e in page.all("a") if e.attributes["href"] == f"#run-{HASH}"]
     assert links == ["GA (n\u00a0=\u00a020)", "GA"]
 
@@ -145,7 +144,7 @@ def test_verdicts_are_counted_in_one_order() -> None:
 
 def test_failures_stand_at_the_top() -> None:
     failures = tuple(("GA", k, f"ValueError: {k}") for k in range(5))
-    page = read(PLAIN._replace(sections=(Table("Failures", ("a", "b", "c"), failures),)))
+    page = read(PLAIN._replace(appendix=(Table("Failures", ("a", "b", "c"), failures),)))
     (notice,) = page.all("div", class_="notice failed")
     assert "5 replicates failed." in notice.text
     assert "GA, replicate 2: ValueError: 2" in notice.text and "ValueError: 3" not in notice.text
@@ -162,7 +161,7 @@ def test_logs_of_a_run_are_linked_and_its_commands_can_be_copied() -> None:
     assert logs.text == "0 162.8, certified1 failed"
     copied = [each.text for each in page.all("code", class_="copy")]
     assert copied == [f"evoexp {command} {HASH}" for command in commands]
-    alone = read(PLAIN._replace(runs=(RunText("none", ID, 0, 0, False),)))
+    alone = read(PLAIN._replace(runs=(shown_run("none", HASH, ()),)))
     assert len(alone.all("code", class_="copy")) == 1
 
 

@@ -24,7 +24,6 @@ from evoexp.report.statistics.inference import (
     quantile,
     quantiles,
     spread,
-    vargha_delaney,
 )
 from matrix import matrices_are_asked_for
 
@@ -119,7 +118,7 @@ def test_the_effect_is_that_of_all_pairs_counted_one_by_one(
     x, y = np.array(first), np.array(second)
     wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)
     found, other = effect(x, y, 0.95), effect(y, x, 0.95)
-    assert found.a12 == wins.sum() / wins.size == vargha_delaney(x, y)
+    assert found.a12 == wins.sum() / wins.size
     assert found.a12 == pytest.approx(1.0 - other.a12)
     assert 0.0 <= found.interval.low <= found.a12 <= found.interval.high <= 1.0
     assert found.interval == pytest.approx((1.0 - other.interval.high, 1.0 - other.interval.low))
@@ -162,7 +161,6 @@ def test_effect_of_equal_and_of_no_values() -> None:
     same = effect(np.ones(30), np.ones(20), 0.95)
     assert (same.a12, same.p_value, same.direction) == (0.5, 1.0, 0)
     assert same.interval.low < 0.5 < same.interval.high
-    assert math.isnan(effect(np.empty(0), np.ones(3), 0.95).a12)
 
 
 def test_expected_effort_counts_what_failures_spent() -> None:

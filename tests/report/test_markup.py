@@ -14,9 +14,10 @@ from evoexp.commands.console import coloured, new_table, plain_console
 from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
 from evoexp.report.pages import markdown, motion_pictures
-from evoexp.report.pages.index import in_few_words
+from evoexp.report.pages.index import in_few_words, provenance
 from evoexp.report.pages.latex_tables import escaped, latex_tables
-from evoexp.report.pages.page_parts import Document, RunText, Table, Verdict, provenance
+from evoexp.report.pages.page_parts import Document, Table, Verdict
+from report_samples import shown_run
 
 
 @pytest.mark.parametrize(
@@ -141,8 +142,9 @@ TABLE = Table(
 def latex(table: Table) -> list[str]:
     """Return the lines of a table in LaTeX; braces balance."""
     words = "A & B", "evoexp report x", "exp_1", "paper", (), ""
-    runs = (RunText("condition", "0" * 64, 20, 0, False),)
-    document = Document(*words, (table,), runs, "n = 20, seeds 0, 7; run `000000000000`.")
+    runs = (shown_run("condition", "0" * 12, [1.0] * 20),)
+    said = "n = 20, seeds 0, 7; run `000000000000`."
+    document = Document(*words, (table,), (), (), runs, said)
     lines = latex_tables(document)[table.file].decode().splitlines()
     bare = re.sub(r"\\[{}]", "", "".join(line for line in lines if not line.startswith("%")))
     assert bare.count("{") == bare.count("}")
@@ -162,25 +164,27 @@ def test_a_latex_table_has_caption_rows_columns_and_rules() -> None:
     assert r"claim & $\lambda$ = 10 \& more & verdict \\" in lines
     (begin,) = (line for line in lines if line.startswith(r"\begin{tabular}"))
     assert re.fullmatch(r"\\begin\{tabular\}\{p\{0\.4\\linewidth\}rl\}", begin)
-    with pytest.raises(KeyError):  # no table without a file
-        latex(TABLE._replace(file=""))
 
 
-NINE = [(str(k), 2) for k in range(9)]
+NINE = [(str(k), 2, k % 2) for k in range(9)]
 
 
 @pytest.mark.parametrize(
-    ("runs", "seeds", "expected"),
+    ("runs", "expected"),
     [
-        ([], (0,), ""),
-        ([("a", 1)], (3,), "n = 1, seed 3; run `a`."),
-        ([("a", 5), ("b", 7)], (0,), "n = 5–7 of each condition, seed 0; runs `a`, `b`."),
-        ([("a", 5), ("a", 5)], (0,), "n = 5 of each condition, seed 0; run `a`."),
-        (NINE, (0, 1), "n = 2 of each condition, seeds 0, 1; runs `0`, `1`, `2`, `3` and 5 more."),
+        ([], ""),
+        ([("a", 1, 3)], "n = 1, seed 3; run `a`."),
+        ([("a", 5, 0), ("b", 7, 0)], "n = 5–7 of each condition, seed 0; runs `a`, `b`."),
+        ([("a", 5, 0), ("a", 5, 0)], "n = 5 of each condition, seed 0; run `a`."),
+        (NINE, "n = 2 of each condition, seeds 0, 1; runs `0`, `1`, `2`, `3` and 5 more."),
     ],
 )
-def test_provenance(runs: list[tuple[str, int]], seeds: tuple[int, ...], expected: str) -> None:
-    assert provenance(runs, seeds) == expected
+def test_provenance(runs: list[tuple[str, int, int]], expected: str) -> None:
+    found: Any = [
+        SimpleNamespace(hash12=name, done=done, condition=SimpleNamespace(seed=seed))
+        for name, done, seed in runs
+    ]
+    assert provenance(found) == expected
 
 
 @given(st.text(alphabet=st.sampled_from(r"""ab \{}$&#_%~^<>|"[]*'(ü""")))

@@ -64,7 +64,7 @@ def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: P
     # the experiment's own number was fixed before
     assert [found.added(fixed=fixed) for fixed in (1, 2, 3)] == [2, 1, 0]
     parts = Page("title", ""), Results("", "", (found,)), page_settings("", "generic")
-    text = markdown.page(document(*parts, "evoexp report"))
+    text = markdown.page(document(*parts, "evoexp report", {}))
     assert f"**Replicates added later.** {found.label}: 2 of 3" in text
 
 

@@ -116,4 +116,4 @@ def space(
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
     usual: dict[str, Any] = {"view": (22.0, -55.0), "zoom": 0.95, "label_pads": (-7, -7, -7)}
     look = usual | {"ticks": (2, 4)} | look
-    return surfaces.space(figure, place, low, high, pad, unit, pale=True, **look)
+    return surfaces.space(figure, place, low, high, pad, unit, **look)

@@ -7,9 +7,3 @@ OBSTACLE, OBJECT, GOOD = "#8a8f94", "#b8860b", "#117733"
 def arm_colour(arm: int) -> str:
     """Return the colour of an arm, counted from 0."""
     return ARM_COLOURS[arm % len(ARM_COLOURS)]
-
-
-def rgb(colour: str) -> tuple[float, float, float]:
-    """Return red, green and blue of a colour, each from 0 to 1."""
-    red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    return red, green, blue

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 
-from evoexp.playback.colours import OBJECT, OBSTACLE, arm_colour, rgb
+from evoexp.playback.colours import OBJECT, OBSTACLE, arm_colour
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import Outline, Shape
 from evoexp.records import FloatArray
@@ -26,10 +26,10 @@ Fields = dict[str, Any]
 def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
     """Return one entity per body of some roles, in the frame that moves it."""
     names, radius = frame_names(recording), recording.view.radius
-    shapes = (shape for shape in recording.shapes if shape.role in roles)
     return [
-        _body(shape.name, names[shape.frame], shape, shape.pose, OPACITY[shape.role], radius)
-        for shape in shapes
+        _body(shape, names[shape.frame], OPACITY[shape.role], radius)
+        for shape in recording.shapes
+        if shape.role in roles
     ]
 
 
@@ -37,11 +37,11 @@ def ghosts(recording: Recording) -> list[Any]:
     """Return translucent copies of all moving bodies at the start and at the end."""
     entities = []
     for when, tick in (("start", 0), ("end", -1)):
-        for shape in (shape for shape in recording.shapes if shape.frame >= 0):
-            frame = pin.XYZQUATToSE3(recording.poses.world[tick, shape.frame])
-            pose = pin.SE3ToXYZQUAT(frame * pin.XYZQUATToSE3(shape.pose))
-            name, radius = f"{when} of {shape.name}", recording.view.radius
-            entities.append(_body(name, WORLD, shape, pose, OPACITY[when], radius))
+        for shape in recording.shapes:
+            if shape.frame >= 0:
+                pose = recording.world_pose(shape, tick)
+                ghost = shape._replace(name=f"{when} of {shape.name}", pose=pose)
+                entities.append(_body(ghost, WORLD, OPACITY[when], recording.view.radius))
     return entities
 
 
@@ -66,13 +66,11 @@ def frame_names(recording: Recording) -> list[str]:
     return [*(frame.name for frame in recording.frames), WORLD]
 
 
-def _body(
-    name: str, frame: str, shape: Shape, pose: FloatArray, opacity: float, radius: float
-) -> Any:
-    """Return a body at a pose (7,) in a frame as one entity, in a view of a radius."""
+def _body(shape: Shape, frame: str, opacity: float, radius: float) -> Any:
+    """Return a body in a frame as one entity, in a view of a radius."""
     colours = {"arm": arm_colour(shape.arm), "object": OBJECT, "obstacle": OBSTACLE}
-    colour, place = _colour(colours[shape.role], opacity), pin.XYZQUATToSE3(pose)
-    return _entity(name, frame, **_primitives(shape.outline, place, colour, radius))
+    colour, place = _colour(colours[shape.role], opacity), pin.XYZQUATToSE3(shape.pose)
+    return _entity(shape.name, frame, **_primitives(shape.outline, place, colour, radius))
 
 
 def _entity(name: str, frame: str, **primitives: Any) -> Any:
@@ -138,4 +136,5 @@ def _vector(values: Iterable[float]) -> dict[str, float]:
 
 
 def _colour(colour: str, opacity: float) -> Fields:
-    return dict(zip("rgba", (*rgb(colour), opacity), strict=True))
+    parts = (value / 255.0 for value in bytes.fromhex(colour[1:]))
+    return dict(zip("rgba", (*parts, opacity), strict=True))

@@ -7,6 +7,7 @@ whose arrays Foxglove's Plot panel draws.
 
 import io
 import json
+from collections import Counter
 from importlib import resources
 from typing import Any
 
@@ -33,6 +34,11 @@ CLEARANCE = {
     "type": "object",
     "properties": dict.fromkeys(("instant", "clearance", "required", "contact"), NUMBER)
     | {"pair": TEXT},
+}
+ANSWERS = {
+    True: "certified: no two bodies ever touch",
+    False: "refuted: bodies touch",
+    None: "undecided",
 }
 IMPROVEMENTS = {
     "title": "evoexp.Improvements",
@@ -69,11 +75,10 @@ def playable_log(recording: Recording) -> bytes:
     if rows:
         columns = dict(zip(("generation", "best_cost"), zip(*rows, strict=True), strict=True))
         out.json("/improvements", IMPROVEMENTS, 0, columns)
-    waiting = _log_messages(recording)
+    for moment, message in _log_messages(recording):
+        out.message("/log", moment, message)
     for k, instant in enumerate(recording.times.tolist()):
         now = nanoseconds(recording, instant)
-        while waiting and waiting[0][0] <= now:
-            out.message("/log", *waiting.pop(0))
         out.message("/tf", now, _transforms(recording, k, now))
         rates = recording.q[k].tolist(), recording.dq[k].tolist()
         states: list[Any] = [
@@ -91,9 +96,8 @@ def playable_log(recording: Recording) -> bytes:
         }
         values |= {"clearance": least} if np.isfinite(least) else {}
         out.json("/clearance", CLEARANCE, now, values)
-    for moment, message in waiting:
-        out.message("/log", moment, message)
-    return out.finish()
+    out.writer.finish()
+    return out.buffer.getvalue()
 
 
 def layout() -> bytes:
@@ -110,39 +114,35 @@ class _Playable:
     """Writes an MCAP in memory; a channel is registered with its first message."""
 
     def __init__(self) -> None:
-        self._buffer = io.BytesIO()
-        self.writer = Writer(self._buffer, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
+        self.buffer = io.BytesIO()
+        self.writer = Writer(self.buffer, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         self.writer.start(profile="", library=LIBRARY)
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, list[int]] = {}  # topic → id, messages so far
+        self._schemas: dict[Any, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts = Counter[int]()  # messages of each channel
 
     def message(self, topic: str, moment: int, message: Any) -> None:
         """Append a message of a protobuf schema."""
-        name = message.DESCRIPTOR.full_name
-        if name not in self._schemas:
-            self._schemas[name] = register_schema(self.writer, type(message))
-        self._add(topic, "protobuf", name, moment, message.SerializeToString(deterministic=True))
+        kind = type(message)
+        if topic not in self._channels:
+            if kind not in self._schemas:
+                self._schemas[kind] = register_schema(self.writer, kind)
+            channel = self.writer.register_channel(topic, "protobuf", self._schemas[kind])
+            self._channels[topic] = channel
+        self._add(topic, moment, message.SerializeToString(deterministic=True))
 
     def json(self, topic: str, schema: dict[str, Any], moment: int, values: dict[str, Any]) -> None:
-        """Append a message of one of our own schemas."""
-        name = str(schema["title"])
-        if name not in self._schemas:
-            data = json.dumps(schema, separators=(",", ":")).encode()
-            self._schemas[name] = self.writer.register_schema(name, "jsonschema", data)
-        self._add(topic, "json", name, moment, json.dumps(values, allow_nan=False).encode())
-
-    def finish(self) -> bytes:
-        """Return the file."""
-        self.writer.finish()
-        return self._buffer.getvalue()
-
-    def _add(self, topic: str, encoding: str, schema: str, moment: int, data: bytes) -> None:
+        """Append a message of one of our own schemas, which one topic has alone."""
         if topic not in self._channels:
-            number = self.writer.register_channel(topic, encoding, self._schemas[schema])
-            self._channels[topic] = [number, 0]
+            data = json.dumps(schema, separators=(",", ":")).encode()
+            number = self.writer.register_schema(schema["title"], "jsonschema", data)
+            self._channels[topic] = self.writer.register_channel(topic, "json", number)
+        self._add(topic, moment, json.dumps(values, allow_nan=False).encode())
+
+    def _add(self, topic: str, moment: int, data: bytes) -> None:
         channel = self._channels[topic]
-        self.writer.add_message(channel[0], moment, data, moment, channel[1])
-        channel[1] += 1
+        self.writer.add_message(channel, moment, data, moment, self._counts[channel])
+        self._counts[channel] += 1
 
 
 def _stamp(now: int) -> dict[str, int]:
@@ -168,9 +168,7 @@ def _transforms(recording: Recording, k: int, now: int) -> Any:
 def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
     """Return verdict, least clearance and contacts as messages, in the order of time."""
     verdict, unit = recording.verdict, recording.length_unit
-    proof, refutation = "certified: no two bodies ever touch", "refuted: bodies touch"
-    answer = {True: proof, False: refutation, None: "undecided"}
-    rows = [(0.0, Log.INFO, f"{recording.heading.title}: {answer[verdict.certified]}")]
+    rows = [(0.0, Log.INFO, f"{recording.heading.title}: {ANSWERS[verdict.certified]}")]
     if verdict.certified is not False and verdict.clearance_at is not None:
         is_kept = verdict.certified_margin is not False
         text = f"least clearance {verdict.clearance:.6g} {unit}: {verdict.clearance_pair}"

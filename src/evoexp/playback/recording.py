@@ -1,7 +1,7 @@
 """The recording of one motion, from which pages, playable logs and trajectories are written."""
 
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -88,6 +88,13 @@ class Recording(NamedTuple):
     # (nq,) those of the robot itself [rad/s, length unit/s]; inf: it has none
     velocity_limits: FloatArray
 
+    def world_pose(self, shape: Shape, tick: int) -> FloatArray:
+        """Return the pose of a body in the world at a tick, (7,)."""
+        if shape.frame < 0:
+            return shape.pose
+        frame = pin.XYZQUATToSE3(self.poses.world[tick, shape.frame])
+        return pose(frame * pin.XYZQUATToSE3(shape.pose))
+
 
 def record(
     condition: Condition, solution: FloatArray, heading: Heading, limits: SpeedLimits | None = None
@@ -111,9 +118,8 @@ def record_motion(
             f"{heading.title}: the answer of '{type(planner).component}' is no motion here: "
             "nothing to watch"
         )
-    robot = condition.robot
-    assert isinstance(robot, Robot)
-    assembly = robot.build()
+    assert isinstance(condition.robot, Robot)
+    assembly = condition.robot.build()
     margin = planner.security_margin(problem)
     model, size = parts[0].scene.model, parts[0].scene.size
     joints = joints_of(assembly)
@@ -124,7 +130,12 @@ def record_motion(
     where = poses(model, motion, times, parts, carried)
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
-    places = _targets(condition.scenario, robot)
+    # the places that a scenario names, by points in the plane or in space
+    scenario = condition.scenario
+    named = scenario.named_places(condition.robot) if hasattr(scenario, "named_places") else ()
+    places = tuple(
+        Target(name.replace("_", " "), np.array([*point, 0.0][:3])) for name, point in named
+    )
     velocity_limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
     is_limited = (velocity_limits > 0.0) & (velocity_limits < 1e6)  # Pinocchio's default is none
     return Recording(
@@ -153,13 +164,6 @@ def record_motion(
         parts=tuple(parts),
         velocity_limits=np.where(is_limited, velocity_limits, np.inf),
     )
-
-
-def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
-    """Return the places that a scenario names for a robot, by points in the plane or in space."""
-    named = scenario.named_places(robot) if hasattr(scenario, "named_places") else ()
-    places = ((name.replace("_", " "), np.array([*point, 0.0][:3])) for name, point in named)
-    return tuple(Target(*place) for place in places)
 
 
 def joints_of(assembly: Assembly) -> tuple[Joint, ...]:

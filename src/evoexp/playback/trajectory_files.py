@@ -103,11 +103,10 @@ def read_message(data: dict[str, Any]) -> JointTrajectory:
                 raise ValueError(f"{must}, was {len(row)}")
     positions, velocities = (
         {
-            name: Values(column, str(unit))
-            for name, unit, column in zip(names, units, table, strict=False)
+            name: Values(column, str(unit))  # none where no point has velocities
+            for name, unit, column in zip(names, units, np.array(rows[key]).T, strict=False)
         }
-        # no columns where no point has velocities
-        for table in (np.array(rows[key]).T for key in ("positions", "velocities"))
+        for key in ("positions", "velocities")
     )
     unread = ("accelerations",) if np.any(rows["accelerations"]) else ()
     return JointTrajectory(positions, velocities, _times(points), unread)
@@ -162,15 +161,15 @@ def fitted(
         remarks.append(f"values without a unit are read in rad and {length_unit}")
     names, motion = [joint.name for joint in joints], Motion(q)
     unread = [*given.unread, *(name for name in given.positions if name not in names)]
+    curves = "straight lines between the points"
     if times is not None and all(name in given.velocities for name in names):
         rates = [_scaled(given.velocities[joint.name], joint, length_unit) for joint in joints]
         if np.any(rates):
             motion = hermite_motion(times, q, np.array(rates).T)
+            curves = "cubics between the points, by their velocities"
     elif given.velocities:
         unread.append("velocities")  # of some joints, or without times
-    is_straight = motion.coefficients is None
-    curves = "straight lines between the points", "cubics between the points, by their velocities"
-    remarks.append(curves[0] if is_straight else curves[1])
+    remarks.append(curves)
     if unread:
         remarks.append(f"not read: {printable(', '.join(unread))}")
     return motion, tuple(remarks)
@@ -220,12 +219,11 @@ def _meaning(rest: str, units: set[str]) -> tuple[str, bool] | None:
 def _scaled(values: Values, joint: Joint, length_unit: str) -> FloatArray:
     """Return values in rad, or in the scene's unit of length."""
     unit, numbers = values.unit, values.numbers
+    known = {**TURNS, "": 1.0}
     if joint.prismatic:
+        others = LENGTHS if length_unit in LENGTHS else {}
         known = {length_unit: 1.0, "": 1.0}
-        if length_unit in LENGTHS:
-            known |= {name: value / LENGTHS[length_unit] for name, value in LENGTHS.items()}
-    else:
-        known = {**TURNS, "": 1.0}
+        known |= {name: value / LENGTHS[length_unit] for name, value in others.items()}
     if unit not in known:
         raise ValueError(
             f"{joint.name}: must be in {' or '.join(filter(None, known))}, was in {unit}"

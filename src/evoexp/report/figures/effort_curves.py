@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import style
+from evoexp.report.figures import marks, style
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
 from evoexp.report.statistics.inference import quantiles
@@ -39,9 +39,7 @@ def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> 
     reached: dict[str, list[float]] = {}
     for own in runs:
         for longest in own.problem.targets:
-            effort, done = own.first_reached(longest)
-            values = np.where(done, effort, np.inf).tolist()
-            reached.setdefault(own.planner, []).extend(values)
+            reached.setdefault(own.planner, []).extend(own.efforts(longest).tolist())
     axis = _axis(runs) if axis is None else axis
     return pd.DataFrame(
         {
@@ -56,8 +54,7 @@ def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> 
 
 def _axis(runs: Sequence[PlannerRuns]) -> FloatArray:
     """Return efforts from a little before the first proven answer of all to the longest run."""
-    firsts = [own.first_reached() for own in runs]
-    first = [np.where(done, effort, np.inf).min() for effort, done in firsts]
+    first = [own.efforts().min() for own in runs]
     most = max(1.0, *(float(own.spent.max()) for own in runs))
     least = min([value for value in first if 0.0 < value < np.inf], default=most / 10.0)
     return np.geomspace(BEFORE * least, most, POINTS)
@@ -82,11 +79,10 @@ def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
         axis = np.geomspace(max(least, 1.0), most, POINTS // 2)
         early = (table[table["collision_queries"] <= x] for x in axis)
         best = np.array([own._replace(table=part).best_lengths for part in early])  # (points, runs)
-        spread = dict(
-            zip(("median", "lower", "upper"), quantiles(best, (0.5, 0.25, 0.75)), strict=True)
-        )
-        columns: dict[str, Any] = {"planner": own.planner}
-        parts.append(pd.DataFrame(columns | {"collision_queries": axis} | spread))
+        median, lower, upper = quantiles(best, (0.5, 0.25, 0.75))
+        spread = {"median": median, "lower": lower, "upper": upper}
+        columns = {"planner": own.planner, "collision_queries": axis, **spread}
+        parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -134,13 +130,12 @@ def _draw_share_curves(axes: Axes, table: pd.DataFrame, planners: Sequence[str])
 def draw_lengths(table: pd.DataFrame) -> Figure:
     """Draw the best proven length so far of one problem."""
     figure, (axes,) = style.panels(3.6)
-    planners = list(table["planner"].unique())
+    table, planners = table.replace([np.inf], np.nan), list(table["planner"].unique())
     for k, planner in enumerate(planners):
-        band = table[table["planner"] == planner].replace([np.inf], np.nan)
-        look: dict[str, Any] = {"color": style.curve_look(k)["color"], "alpha": 0.18}
+        band = table[table["planner"] == planner]
         x, low, high = (band[name] for name in ("collision_queries", "lower", "upper"))
-        axes.fill_between(x, low, high, step="post", linewidth=0, **look)
-    draw_steps(axes, table.replace([np.inf], np.nan), "collision_queries", "median", planners)
+        marks.band(axes, x, low, high, style.curve_look(k)["color"], step="post")
+    draw_steps(axes, table, "collision_queries", "median", planners)
     axes.set(xlabel="collision queries", ylabel="best proven length so far [rad, m]")
     name_curves(figure, axes, 4)
     return figure

@@ -39,7 +39,6 @@ def scenes_table(shown: Sequence[tuple[str, Recording]]) -> pd.DataFrame:
             *_bodies(recording, 0, "start"),
             *_bodies(recording, -1, "goal"),
             *_still(recording),
-            *_ways(recording),
         ]
         tables.append(_table(rows, panel, title, recording))
     return pd.concat(tables, ignore_index=True)
@@ -61,7 +60,8 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.Da
             drawn = Outline("sphere", (float(radius),))
             if length:
                 drawn = Outline("capsule", (float(radius), length))
-            own.append(_row("cover", "", 1, drawn, np.asarray(pin.SE3ToXYZQUAT(place * pose))))
+            here = np.asarray(pin.SE3ToXYZQUAT(place * pose))
+            own.append(_row("cover", Shape("", joint - 1, here, drawn, "arm", 1), here))
         names = f"{title}: {len(bodies)} exact bodies", f"{len(own)} covers that the search tests"
         tables.append(_table(bodies, 2 * k, names[0], recording))
         tables.append(_table(own, 2 * k + 1, names[1], recording))
@@ -91,61 +91,52 @@ def _table(rows: Iterable[dict[str, Any]], panel: int, title: str, own: Recordin
 def _bodies(recording: Recording, tick: int, element: str) -> Iterable[dict[str, Any]]:
     """Yield the rows of the bodies that move, and of the robot's that stand, at a tick."""
     for shape in recording.shapes:
-        if shape.role == "obstacle" or (shape.frame < 0 and element == "goal"):
-            continue
-        pose = _pose(recording, shape, tick)
-        name = "object" if shape.role == "object" else element
-        if not (shape.role == "object" and element == "goal"):
-            yield _row(name, shape.name, shape.arm, shape.outline, pose)
+        is_object = shape.role == "object"
+        if shape.role != "obstacle" and (element != "goal" or (shape.frame >= 0 and not is_object)):
+            yield _row("object" if is_object else element, shape, recording.world_pose(shape, tick))
 
 
 def _still(recording: Recording) -> Iterable[dict[str, Any]]:
-    """Yield the rows of obstacles and targets."""
+    """Yield the rows of obstacles, targets and ways of tools."""
     for shape in recording.shapes:
         if shape.role == "obstacle":
-            yield _row("obstacle", shape.name, -1, shape.outline, _pose(recording, shape, 0))
-    for target in recording.targets:
-        yield {
-            "element": "target",
-            "name": target.name,
-            "arm": -1,
-            **dict(zip("xyz", target.point, strict=True)),
-        }
-
-
-def _ways(recording: Recording) -> Iterable[dict[str, Any]]:
+            yield _row("obstacle", shape, recording.world_pose(shape, 0))
+    for name, point in recording.targets:
+        yield {"element": "target", "name": name, "arm": -1, **dict(zip("xyz", point, strict=True))}
     for arm, way in enumerate(recording.traces):
         for x, y, z in way:
             yield {"element": "way", "name": "tool", "arm": arm, "x": x, "y": y, "z": z}
 
 
-def _row(element: str, name: str, arm: int, drawn: Outline, pose: FloatArray) -> dict[str, Any]:
-    corners = surfaces.corners_of(drawn)
-    size = (*drawn.size, 0.0, 0.0, 0.0)[:3]
+def _row(element: str, shape: Shape, pose: FloatArray) -> dict[str, Any]:
+    corners = surfaces.corners_of(shape.outline)
+    size = (*shape.outline.size, 0.0, 0.0, 0.0)[:3]
     text = "" if corners is None else ";".join(" ".join(f"{v:.5g}" for v in c) for c in corners)
     return {
         "element": element,
-        "name": name,
-        "arm": arm,
-        "kind": drawn.kind,
+        "name": shape.name,
+        "arm": shape.arm,
+        "kind": shape.outline.kind,
         **dict(zip(SIZE, size, strict=True)),
         **dict(zip(POSE, pose, strict=True)),
         "corners": text,
     }
 
 
-def _pose(recording: Recording, shape: Shape, tick: int) -> FloatArray:
-    """Return the pose of a body in the world at a tick, (7,)."""
-    if shape.frame < 0:
-        return shape.pose
-    frame = pin.XYZQUATToSE3(recording.poses.world[tick, shape.frame])
-    return np.asarray(pin.SE3ToXYZQUAT(frame * pin.XYZQUATToSE3(shape.pose)))
-
-
 def draw_scenes(table: pd.DataFrame) -> Figure:
-    """Draw one panel per motion."""
+    """Draw one panel per motion, and name the elements below."""
     figure = _panels(table, 3.5, lambda panel: table[table["panel"] == panel])
-    _key(figure, table)
+    colour = style.arm_colour(0)
+    keys: dict[str, Any] = {
+        "start": Patch(color=colour, label="start"),
+        "goal": Patch(color=colour, alpha=0.35, label="goal"),
+        "obstacle": Patch(color=OBSTACLE, alpha=0.4, label="obstacle"),
+        "object": Patch(color=OBJECT, label="carried"),
+        "way": style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"),
+        "target": style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"),
+    }
+    there = set(table["element"])
+    style.keys_below(figure, [key for element, key in keys.items() if element in there])
     return figure
 
 
@@ -161,7 +152,7 @@ def _panels(table: pd.DataFrame, height: float, room: Callable[[int], pd.DataFra
     figure = style.figure(height * lines + 0.3)
     for k, ((panel, title), rows) in enumerate(panels):
         place = lines, min(len(panels), 2), k + 1
-        _panel(figure, place, title, rows, planar=planar, room=room(panel))
+        _panel(figure, place, rows, planar, room(panel)).set_title(title, fontsize=8)
     return figure
 
 
@@ -224,12 +215,10 @@ def _room(table: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
 def _panel(
     figure: Figure,
     place: tuple[int, int, int],
-    title: str,
     rows: pd.DataFrame,
-    *,
     planar: bool,
     room: pd.DataFrame,
-) -> None:
+) -> Any:
     """Draw a scene as seen along z, or in space, as large as the bodies of some rows."""
     low, high = _room(room)
     spans, unit = high - low, rows["length_unit"].iloc[0]
@@ -253,7 +242,7 @@ def _panel(
     else:  # all surfaces in one collection, which sorts them by depth
         pad = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
         view: dict[str, Any] = {"view": VIEW, "zoom": 1.05, "label_pads": (-7, -7, -7)}
-        axes = surfaces.space(figure, place, low, high, pad, unit, ticks=(3, 3), pale=True, **view)
+        axes = surfaces.space(figure, place, low, high, pad, unit, ticks=(3, 3), **view)
         colours = np.concatenate([surfaces.shaded(*body[1:]) for body in bodies])
         triangles = np.concatenate([body[1] for body in bodies])
         surface = Poly3DCollection(triangles, facecolors=colours, linewidth=0)
@@ -268,19 +257,4 @@ def _panel(
     if len(targets):
         stars: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 7, "zorder": 10}
         axes.plot(*(targets[name] for name in columns), "*", linestyle="none", **stars)
-    axes.set_title(title, fontsize=8)
-
-
-def _key(figure: Figure, table: pd.DataFrame) -> None:
-    """Name the elements below the figure."""
-    colour = style.arm_colour(0)
-    keys: dict[str, Any] = {
-        "start": Patch(color=colour, label="start"),
-        "goal": Patch(color=colour, alpha=0.35, label="goal"),
-        "obstacle": Patch(color=OBSTACLE, alpha=0.4, label="obstacle"),
-        "object": Patch(color=OBJECT, label="carried"),
-        "way": style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"),
-        "target": style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"),
-    }
-    there = set(table["element"])
-    style.keys_below(figure, [key for element, key in keys.items() if element in there])
+    return axes

@@ -1,9 +1,8 @@
 """The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
 
-import functools
 import io
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from importlib import resources
 from logging.handlers import BufferingHandler
@@ -86,14 +85,12 @@ def drawn(
     scale = _SCALES[width]
     with mpl.rc_context():
         mpl.rcdefaults()
-        scaled = {
-            name: value * scale.text
-            if isinstance(value, float) and name.endswith(_SCALED)
-            else value
-            for name, value in _own_style().items()
-        }
-        theirs = _style_file(style_file) if style_file else {}
-        mpl.rcParams.update(scaled | theirs)  # type: ignore[arg-type]
+        with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
+            own = dict(mpl.rc_params_from_file(path, use_default_template=False))
+        for name, value in own.items():
+            if isinstance(value, float) and name.endswith(_SCALED):
+                own[name] = value * scale.text
+        mpl.rcParams.update(own | (_style_file(style_file) if style_file else {}))
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         token = _scale.set(scale)
         try:
@@ -108,23 +105,15 @@ def drawn(
     return images
 
 
-@functools.cache
-def _own_style() -> Mapping[str, Any]:
-    """Return the parameters of evoexp's own style."""
-    with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
-        own = mpl.rc_params_from_file(path, use_default_template=False)
-    return {str(name): value for name, value in own.items()}
-
-
-def _style_file(path: str) -> dict[str, Any]:
+def _style_file(path: str) -> dict[Any, Any]:
     """Return the parameters that a matplotlib style file sets, but those that name files' ids."""
     logger, handler = logging.getLogger("matplotlib"), BufferingHandler(10_000)
     handler.setLevel(logging.WARNING)  # matplotlib logs what a style file has wrong
     logger.addHandler(handler)
-    style, reasons = dict[str, Any](), list[str]()
+    style, reasons = dict[Any, Any](), list[str]()
     try:
         theirs = mpl.rc_params_from_file(path, use_default_template=False)
-        style = {str(name): value for name, value in theirs.items() if name != "svg.hashsalt"}
+        style = {name: value for name, value in theirs.items() if name != "svg.hashsalt"}
     except (OSError, ValueError) as error:
         reasons.append(str(error))
     finally:

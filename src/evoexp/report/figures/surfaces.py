@@ -123,7 +123,6 @@ def space(
     zoom: float,
     label_pads: tuple[float, float, float],
     ticks: tuple[int, int],
-    pale: bool = False,
 ) -> Any:
     """Return axes in space with equal scales that hold a box (3,) and room beyond it (3,).
 
@@ -144,7 +143,6 @@ def space(
         (axes.xaxis, axes.yaxis, axes.zaxis), sides < NARROW * sides.max(), strict=True
     ):
         axis.set_major_locator(MaxNLocator(nbins=ticks[0] if is_narrow else ticks[1]))
-        if pale:
-            axis.set_pane_color(PALE)
+        axis.set_pane_color(PALE)
     axes.view_init(elev=view[0], azim=view[1])
     return axes

@@ -39,6 +39,11 @@ from evoexp.report.statistics.problem_ranks import (
     standing,
 )
 
+CSV_COLUMNS = [
+    *("planner", "problem", "n", "proven", "effort", "effort_low", "effort_high"),
+    *("length", "length_lower", "length_upper", "body_queries", "evaluations", "cpu_s"),
+]
+
 
 class Rated(NamedTuple):
     """A condition, rated by the proven answers of its runs."""
@@ -222,24 +227,14 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
     Efforts are expected to a proven answer, in collision queries with their interval, in pairs of
     shapes (body_queries), evaluations and CPU time; those that are not known are empty.
     """
-    table = pd.DataFrame(
-        {
-            "planner": row.planner,
-            "problem": row.problem,
-            "n": row.runs,
-            "proven": row.proven,
-            "effort": row.queries,
-            "effort_low": row.interval.low,
-            "effort_high": row.interval.high,
-            "length": row.lengths.median,
-            "length_lower": row.lengths.lower,
-            "length_upper": row.lengths.upper,
-            "body_queries": row.queries * row.body_tests,
-            "evaluations": row.evaluations,
-            "cpu_s": row.cpu_s,
-        }
+    answers = [
+        (
+            *(row.planner, row.problem, row.runs, row.proven, row.queries, *row.interval),
+            *(*row.lengths[:3], row.queries * row.body_tests, row.evaluations, row.cpu_s),
+        )
         for row in rows
-    )
+    ]
+    table = pd.DataFrame(answers, columns=CSV_COLUMNS)
     return table.to_csv(index=False, lineterminator="\n").encode()
 
 

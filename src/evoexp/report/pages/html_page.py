@@ -9,9 +9,9 @@ from typing import Any
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from evoexp.report.pages.index import CLAIMS, FAILURES
+from evoexp.report.pages.index import CLAIMS, FAILURES, FIGURES, run_logs
 from evoexp.report.pages.markdown import asset, environment
-from evoexp.report.pages.page_parts import Document, Figures, Verdict
+from evoexp.report.pages.page_parts import Document, Table, Verdict
 
 HTML = "index.html"
 FEW = 3  # failures named at the top
@@ -41,7 +41,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
         "command": document.command.removeprefix("evoexp "),
         "partial": dict(document.notices).get("Partial results", ""),
         "failed": sum(run.failed for run in document.runs),
-        "headings": [*headings, *((each["text"].title, each["anchor"]) for each in figures)],
+        "headings": [*headings, *((each["figure"].title, each["anchor"]) for each in figures)],
         "claims": [
             [str(row[0]), cell.text]
             for row in document.rows_below(CLAIMS)
@@ -58,6 +58,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
         {run.hash12: run.label for run in document.runs},
         document=document,
         sections=sections,
+        run_logs=run_logs,
         failures=document.rows_below(FAILURES),
         failures_anchor=dict(headings).get(FAILURES, ""),
         few=FEW,
@@ -89,22 +90,23 @@ def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[dict[
         taken[slug] += 1
         return slug if taken[slug] == 1 else f"{slug}--{taken[slug]}"
 
-    for section in document.sections:
-        place: dict[str, Any] = {"heading": section.heading, "anchor": anchor(section.heading)}
-        place |= {"table": None, "figures": [], "verdicts": ()}
-        if isinstance(section, Figures):
-            for figure in section.figures:
-                file, own = figure.picture("svg", "png"), anchor(figure.stem)
-                size = _SIZE.search(pictures.get(file, b"")[:2000])  # width and height [px]
-                pixels = size and [round(float(size[k]) * PIXELS_PER_POINT) for k in (2, 1)]
-                place["figures"].append(
-                    {"text": figure, "anchor": own, "file": file, "size": pixels}
-                )
-        else:
-            cells = (cell for row in section.rows for cell in row)
-            place["table"] = section
-            place["verdicts"] = verdict_counts(c.text for c in cells if isinstance(c, Verdict))
-        yield place
+    def place(heading: str, table: Table | None) -> dict[str, Any]:
+        cells = (cell for row in table.rows for cell in row) if table else ()
+        verdicts = verdict_counts(cell.text for cell in cells if isinstance(cell, Verdict))
+        own: dict[str, Any] = {"heading": heading, "anchor": anchor(heading), "table": table}
+        return own | {"verdicts": verdicts, "figures": []}
+
+    yield from (place(table.heading, table) for table in document.results)
+    if document.figures:
+        section = place(FIGURES, None)
+        for figure in document.figures:
+            file = document.picture(figure, "svg", "png")
+            size = _SIZE.search(pictures.get(file, b"")[:2000])  # width and height [px]
+            pixels = size and [round(float(size[k]) * PIXELS_PER_POINT) for k in (2, 1)]
+            own = {"figure": figure, "anchor": anchor(figure.stem), "file": file, "size": pixels}
+            section["figures"].append(own)
+        yield section
+    yield from (place(table.heading, table) for table in document.appendix)
 
 
 def written(template: str, runs: Mapping[str, str] | None = None, **values: Any) -> bytes:

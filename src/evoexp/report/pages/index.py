@@ -6,17 +6,7 @@ from pathlib import Path
 
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_file import own_pages
-from evoexp.report.pages.page_parts import (
-    Document,
-    Figures,
-    FigureText,
-    Page,
-    Player,
-    RunText,
-    Table,
-    Verdict,
-    provenance,
-)
+from evoexp.report.pages.page_parts import Document, Page, Player, Table, Verdict
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -25,9 +15,10 @@ from evoexp.report.statistics.inference import Proportion
 
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
+MOST_NAMED = 4  # runs whose hashes a caption spells out
 LONGEST_NAME = 40  # letters of a table's heading in the name of its file
 BETWEEN = " · "  # the parts of a label of a problem and a planner
-CLAIMS, FAILURES = "Claims", "Failures"  # headings
+CLAIMS, FIGURES, FAILURES = "Claims", "Figures", "Failures"  # headings
 
 
 def document(
@@ -35,7 +26,7 @@ def document(
     results: Results,
     settings: ReportSettings,
     command: str,
-    players: Mapping[tuple[str, int], Player] | None = None,
+    players: Mapping[tuple[str, int], Player],
 ) -> Document:
     """Return the text of a page, with the players of motions by the keys of the played runs."""
     claims = (
@@ -48,33 +39,15 @@ def document(
         for replicate, reason in c.failures.items()
     )
     # what came out, before what it follows from
-    quantities = _quantities(page, results)
-    first = _table("claims", claims), _conditions(results, settings), quantities
-    later = (
+    tables = (
+        _table("claims", claims),
+        _conditions(results, settings),
+        _quantities(page, results),
+        *page.tables,
         Table("Known defects and checks", ("check", "finding"), page.checks),
         *(_comparison(heading, rows, settings) for heading, rows in page.comparisons),
     )
-    figures = Figures(
-        tuple(
-            FigureText(
-                each.stem,
-                each.title,
-                f"{each.caption} {_provenance(each.conditions)}".strip(),
-                tuple(settings.formats),
-                tuple(players[run.key] for run in each.plays if players and run.key in players),
-            )
-            for each in page.drawings
-        )
-    )
-    sections = list[Table | Figures]()
-    last = _parameters(results), _table("failures", failures)
-    for table in (*first, *page.tables, *later, figures, *last):
-        if isinstance(table, Table) and table.rows:
-            number = 1 + sum(isinstance(section, Table) for section in sections)
-            words = "_".join(re.findall("[a-z0-9]+", table.heading.lower()))[:LONGEST_NAME]
-            sections.append(table._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex"))
-        elif isinstance(table, Figures) and table.figures:
-            sections.append(table)
+    above = _numbered(tables, 1)
     return Document(
         page.title,
         command,
@@ -82,14 +55,33 @@ def document(
         results.budget,
         tuple(_notices(results)),
         page.introduction,
-        tuple(sections),
-        tuple(map(_run, results.conditions)),
-        _provenance(results.conditions),
+        above,
+        tuple(
+            each._replace(caption=f"{each.caption} {provenance(each.conditions)}".strip())
+            for each in page.drawings
+        ),
+        _numbered((_parameters(results), _table("failures", failures)), len(above) + 1),
+        results.conditions,
+        provenance(results.conditions),
+        tuple(settings.formats),
+        players,
     )
 
 
-def _run(c: ConditionResults) -> RunText:
-    """Return a run, with the addresses of its logs as seen from `reports/<name>/`."""
+def _numbered(tables: Iterable[Table], first: int) -> tuple[Table, ...]:
+    """Return the tables that have rows, with the names of their files, counted from the first."""
+    numbered = list[Table]()
+    for number, table in enumerate((table for table in tables if table.rows), first):
+        words = "_".join(re.findall("[a-z0-9]+", table.heading.lower()))[:LONGEST_NAME]
+        numbered.append(table._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex"))
+    return tuple(numbered)
+
+
+def run_logs(c: ConditionResults) -> list[tuple[int, str, str]]:
+    """Return (replicate, address, result) of the logs of a run, as seen from `reports/<name>/`.
+
+    Of a failed replicate it is the file that tells why.
+    """
 
     def address(path: Path) -> str:
         return Path("../..", *path.parts[-4:]).as_posix()  # runs/<hash>/replicates/<file>
@@ -101,12 +93,23 @@ def _run(c: ConditionResults) -> RunText:
     ):
         result = f"{markdown.number(float(cost))}{words.get(certified, '')}"
         logs.append((k, address(c.run.log_path(k)), result))
-    return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, tuple(sorted(logs)))
+    return sorted(logs)
 
 
-def _provenance(conditions: Sequence[ConditionResults]) -> str:
+def provenance(conditions: Sequence[ConditionResults]) -> str:
+    """Return the sentence that tells whose runs something shows; empty without any."""
+    if not conditions:
+        return ""
+    least, most = (f(c.done for c in conditions) for f in (min, max))
+    number = str(least) if least == most else f"{least}–{most}"
+    each = " of each condition" if len(conditions) > 1 else ""
     seeds = sorted({c.condition.seed for c in conditions})
-    return provenance([(c.condition.id[:12], c.done) for c in conditions], seeds)
+    names = list(dict.fromkeys(f"`{c.hash12}`" for c in conditions))
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return (
+        f"n = {number}{each}, seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}; "
+        f"run{'s' * (len(names) > 1)} {', '.join(names[:MOST_NAMED])}{more}."
+    )
 
 
 def _notices(results: Results) -> Iterator[tuple[str, str]]:
@@ -158,8 +161,7 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
         if found.judged:
             proven = found.certified, found.refuted, found.undecided
             exact = (*proven, found.solved_refuted, found.margin_broken)
-        name = f"`{c.condition.id[:12]}`"
-        rows.append((c.label, name, c.done, c.planned, c.failed, solved, *exact))
+        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, c.failed, solved, *exact))
     return _table("conditions", rows, level=100 * settings.confidence)
 
 

@@ -23,7 +23,8 @@ def escaped(text: str) -> str:
 
 def latex_tables(document: Document) -> dict[str, bytes]:
     """Return the tables of a page, by the names of their files."""
-    return {t.file: _latex(t, document).encode() for t in document.tables if t.file}
+    tables = (*document.results, *document.appendix)
+    return {table.file: _latex(table, document).encode() for table in tables}
 
 
 def _latex(table: Table, document: Document) -> str:

@@ -30,7 +30,7 @@ def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, 
         title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
         if motion := _recorded(c, k, title):
             words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
-            file = f"motion_{c.condition.id[:12]}_{k:04d}.html"
+            file = f"motion_{c.hash12}_{k:04d}.html"
             players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
     return players
 

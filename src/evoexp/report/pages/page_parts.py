@@ -3,7 +3,7 @@
 Texts are plain but for one mark: `words between grave accents` are code.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
@@ -14,8 +14,6 @@ from evoexp.report.statistics.inference import Spread, spread
 
 if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure
-
-MOST_NAMED = 4  # runs whose hashes a caption spells out
 
 
 class PlayedRun(NamedTuple):
@@ -132,50 +130,6 @@ class Player(NamedTuple):
     content: bytes = b""  # HTML
 
 
-class FigureText(NamedTuple):
-    """A figure as text."""
-
-    stem: str  # of its files
-    title: str  # heading
-    caption: str  # below it
-    formats: tuple[str, ...]  # kinds of its pictures
-    motions: tuple[Player, ...] = ()  # pages that play the motions that it shows
-
-    @property
-    def files(self) -> tuple[tuple[str, str], ...]:
-        """(kind, name) of every file: pictures, data rows, sidecar."""
-        return tuple((kind, f"{self.stem}.{kind}") for kind in (*self.formats, "csv", "json"))
-
-    def picture(self, *preferred: str) -> str:
-        """Return the name of the first picture there is of these kinds; empty if there is none."""
-        return next((f"{self.stem}.{kind}" for kind in preferred if kind in self.formats), "")
-
-
-class Figures(NamedTuple):
-    """The section of all figures."""
-
-    figures: tuple[FigureText, ...]
-    heading: str = "Figures"
-
-
-class RunText(NamedTuple):
-    """A stored run that the page shows."""
-
-    label: str  # of the condition
-    condition_id: str  # full hash, 64 hex digits
-    done: int  # finished replicates
-    failed: int  # failed replicates
-    is_reference: bool  # whether it is a reference, which has no motion to view
-    # Of every finished or failed replicate, in order: its index; the address of its log, or of the
-    # file that tells why it failed; best cost and exact verdict, or "failed"
-    logs: tuple[tuple[int, str, str], ...] = ()
-
-    @property
-    def hash12(self) -> str:
-        """The twelve hex digits that name the run."""
-        return self.condition_id[:12]
-
-
 class Document(NamedTuple):
     """The whole text of a page."""
 
@@ -185,9 +139,13 @@ class Document(NamedTuple):
     budget: str  # name of the budget; empty for runs given by their hashes
     notices: tuple[tuple[str, str], ...]  # (title, text): remarks on the results as a whole
     introduction: str  # one paragraph
-    sections: tuple[Table | Figures, ...]  # without empty ones
-    runs: tuple[RunText, ...]  # those that it shows
+    results: tuple[Table, ...]  # tables above the figures, without empty ones
+    figures: tuple[Drawing, ...]
+    appendix: tuple[Table, ...]  # tables below the figures
+    runs: tuple[ConditionResults, ...]  # those that it shows
     provenance: str = ""  # the sentence that tells them: how many, of which seeds and hashes
+    formats: tuple[str, ...] = ()  # kinds of the figures' pictures
+    players: Mapping[tuple[str, int], Player] = {}  # by the keys of the runs that figures play
 
     @property
     def origin(self) -> str:
@@ -196,26 +154,11 @@ class Document(NamedTuple):
         words = [f"{kind} `{name}`" for kind, name in named.items() if name]
         return ", ".join([f"Made by `{self.command}`", *words]) + "."
 
-    @property
-    def tables(self) -> tuple[Table, ...]:
-        """Its tables, in order."""
-        return tuple(each for each in self.sections if isinstance(each, Table))
-
     def rows_below(self, heading: str) -> tuple[tuple[object, ...], ...]:
         """Return the rows of the table of a heading; none if there is no such table."""
-        return next((table.rows for table in self.tables if table.heading == heading), ())
+        tables = (*self.results, *self.appendix)
+        return next((table.rows for table in tables if table.heading == heading), ())
 
-
-def provenance(runs: Sequence[tuple[str, int]], seeds: Sequence[int]) -> str:
-    """Return the sentence that tells whose runs something shows; empty without any."""
-    # `runs` are (hash, finished replicates) of every condition
-    counts = sorted({done for _, done in runs})
-    if not counts:
-        return ""
-    number = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
-    each = " of each condition" if len(runs) > 1 else ""
-    seed = f"seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
-    names = dict.fromkeys(name for name, _ in runs)
-    shown = ", ".join(f"`{name}`" for name in list(names)[:MOST_NAMED])
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return f"n = {number}{each}, {seed}; run{'s' * (len(names) > 1)} {shown}{more}."
+    def picture(self, figure: Drawing, *preferred: str) -> str:
+        """Return the name of a figure's first picture of these kinds; empty if there is none."""
+        return next((f"{figure.stem}.{kind}" for kind in preferred if kind in self.formats), "")

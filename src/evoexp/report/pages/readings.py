@@ -9,7 +9,7 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
@@ -116,12 +116,6 @@ def headline_claims(judged: Sequence[Judged]) -> Iterator[Claim]:
         yield first.claim._replace(text=text, verdict=verdict, evidence="; ".join(evidence))
 
 
-def curve_title(judged: Sequence[Judged], headline: Headline) -> str:
-    """Return a headline claim in words."""
-    first = next(one for one in judged if one.headline is headline)
-    return first.claim.text.removeprefix(f"{first.condition.label}: ")
-
-
 def over_readings(first: str, others: Iterable[str]) -> str:
     """Return the verdict over several readings, from the verdict under each, the default first.
 
@@ -167,11 +161,6 @@ def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
     return rows
 
 
-def headline_quantities(headlines: Sequence[Headline]) -> list[str]:
-    """Return the headers of the headline claims."""
-    return [f"{each.name}: {each.quantity}" for each in headlines]
-
-
 def assumed_rows(read_results: Results, families: Sequence[Family]) -> list[tuple[object, ...]]:
     """Return every assumed number, with the conditions that vary it."""
     # name of a setting, or of a list of settings → its entries; entry → the varying conditions
@@ -194,3 +183,14 @@ def assumed_rows(read_results: Results, families: Sequence[Family]) -> list[tupl
         by_label = "; ".join(varied) or "not varied"
         rows.append((f"`{name}`", shown, ", ".join(filter(None, units)) or "–", reason, by_label))
     return rows
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # a headline claim in words
+    "curve_title": lambda judged, headline: next(
+        one.claim.text.removeprefix(f"{one.condition.label}: ")
+        for one in judged
+        if one.headline is headline
+    ),
+    "headline_quantities": lambda headlines: [f"{h.name}: {h.quantity}" for h in headlines],
+}

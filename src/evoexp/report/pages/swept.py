@@ -11,9 +11,8 @@ import pandas as pd
 
 from evoexp.report.figures import records, sweeps
 from evoexp.report.pages import markdown
-from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import certified, search_seconds, success
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.stored_results import Results
 from evoexp.report.results.swept_settings import Sweep, labelled, main_effects
 from evoexp.report.statistics.comparisons import Values, by_column
 from evoexp.report.statistics.inference import Proportion, spread
@@ -29,24 +28,9 @@ MEASURES: dict[str, Values] = {  # that pages of sweeps tell, by name
 
 def best_condition(sweep: Sweep, results: Results) -> Results:
     """Return the results of the condition of the least median cost alone."""
-    best = sorted(swept_conditions(sweep), key=lambda c: c.spread("best_cost").median)[:1]
+    with_data = (each.results for each in sweep.conditions if each.results.done)
+    best = sorted(with_data, key=lambda c: c.spread("best_cost").median)[:1]
     return results._replace(conditions=tuple(best))
-
-
-def swept_conditions(sweep: Sweep) -> list[ConditionResults]:
-    """Return the conditions with data."""
-    return [each.results for each in sweep.conditions if each.results.done]
-
-
-def curves_are_few(swept_conditions: list[ConditionResults]) -> bool:
-    """Return whether convergence is drawn."""
-    return 0 < len(swept_conditions) <= MOST_CURVES
-
-
-def effects(sweep: Sweep, settings: ReportSettings) -> pd.DataFrame:
-    """Return the effect of each value of each setting on the best cost."""
-    cost = by_column("best_cost")
-    return main_effects(sweep, cost, settings.confidence, settings.num_resamples)
 
 
 def sweep_words(sweep: Sweep) -> dict[str, object]:
@@ -65,18 +49,6 @@ def sweep_words(sweep: Sweep) -> dict[str, object]:
     }
 
 
-def combination_headers(sweep: Sweep) -> tuple[str, ...]:
-    """Return the headers of the table of combinations."""
-    of_base = ("condition",) if any(sweep.bases) else ()
-    return (*of_base, *sweep.settings, "hash", "n", *SHARES, *MEASURES)
-
-
-def effect_headers(effects: pd.DataFrame) -> tuple[str, ...]:
-    """Return the headers of the table of effects."""
-    of_base = ("condition",) if effects["base"].any() else ()
-    return (*of_base, "setting", "value", "pairs", "change of the best cost", "better in")
-
-
 def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]]:
     """Yield a row per combination: shares of runs, and the spreads of what they took."""
     for each in sweep.conditions:
@@ -86,7 +58,7 @@ def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]
         yield (
             *((each.base,) if any(sweep.bases) else ()),
             *each.values,
-            f"`{c.condition.id[:12]}`",
+            f"`{c.hash12}`",
             c.done,
             *(shares if c.done else ("–", "–")),
             *(markdown.spread(spread(of(c))) for of in MEASURES.values()),
@@ -113,4 +85,20 @@ def _more(count: int) -> str:
     return f" The first {most} of {count} panels; the data have all." if count > most else ""
 
 
-PAGE_VALUES: dict[str, Callable[..., Any]] = {"effect_table": lambda effects: effects}
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "swept_conditions": lambda sweep: [c.results for c in sweep.conditions if c.results.done],
+    "curves_are_few": lambda swept_conditions: 0 < len(swept_conditions) <= MOST_CURVES,
+    "combination_headers": lambda sweep: (
+        *["condition"] * any(sweep.bases),
+        *(*sweep.settings, "hash", "n", *SHARES, *MEASURES),
+    ),
+    # effect of each value of each setting on the best cost
+    "effects": lambda sweep, settings: main_effects(
+        sweep, by_column("best_cost"), settings.confidence, settings.num_resamples
+    ),
+    "effect_table": lambda effects: effects,
+    "effect_headers": lambda effects: (
+        *["condition"] * bool(effects["base"].any()),
+        *("setting", "value", "pairs", "change of the best cost", "better in"),
+    ),
+}

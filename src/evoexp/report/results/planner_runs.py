@@ -77,6 +77,11 @@ class PlannerRuns(NamedTuple):
         whole = self.spent if spent is None else spent
         return np.where(reached, first.to_numpy(np.float64, na_value=0.0), whole), reached
 
+    def efforts(self, longest: float = np.inf) -> FloatArray:
+        """Return the queries of each run up to an answer that is so short, (runs,); inf: never."""
+        effort, reached = self.first_reached(longest)
+        return np.where(reached, effort, np.inf)
+
     @property
     def best_lengths(self) -> FloatArray:
         """Least length of a proven answer of each run, (runs,) [rad, m]; inf: none is proven."""

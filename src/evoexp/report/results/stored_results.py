@@ -96,6 +96,11 @@ class ConditionResults:
         return [int(replicate) for replicate in self.summaries.index]
 
     @property
+    def hash12(self) -> str:
+        """The twelve hex digits that name the run."""
+        return self.condition.id[:12]
+
+    @property
     def done(self) -> int:
         """Number of finished replicates."""
         return len(self.summaries)
@@ -121,8 +126,7 @@ class ConditionResults:
     @property
     def verdicts(self) -> Verdicts:
         """Count of the exact verdicts."""
-        known = self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
-        motions = self.summaries[known]
+        motions = self.summaries[~np.isnan(self.column("clearance"))]
         certified, refuted, margin, broken = (
             motions[name].eq(value).fillna(False)
             for name, value in itertools.product(("certified", "certified_margin"), (True, False))

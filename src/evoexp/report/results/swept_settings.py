@@ -100,26 +100,22 @@ def _pairs(
     sweep: Sweep, base: str, setting: int, levels: tuple[str, str], values: Values
 ) -> np.ndarray:
     """Return differences of two values of a setting, (seeds, combinations of the others); NaN."""
-    of_level = []
-    for level in levels:
-        own = {
-            each.values[:setting] + each.values[setting + 1 :]: pd.Series(
-                values(each.results), each.results.summaries.index, dtype=np.float64
-            )
-            for each in sweep.conditions
-            if (each.base, each.values[setting]) == (base, level) and each.results.done
-        }
-        of_level.append(own)
-    first, other = of_level
-    differences = [
-        (two - one).where(two != one, 0.0)  # both may be infinite
-        for rest in first
-        if rest in other
-        for one, two in (first[rest].align(other[rest], join="inner"),)  # on common seeds
-    ]
-    if not differences:
-        return np.empty((0, 0))
-    return pd.concat(differences, axis=1).sort_index().to_numpy(np.float64)
+    runs = pd.concat(
+        pd.DataFrame(
+            {
+                "seed": each.results.summaries.index,
+                "level": each.values[setting],
+                "rest": str(each.values[:setting] + each.values[setting + 1 :]),
+                "value": values(each.results),
+            }
+        )
+        for each in sweep.conditions
+        if each.base == base
+    ).set_index(["seed", "rest"])
+    first, other = (runs.loc[runs["level"] == level, "value"] for level in levels)
+    first, other = first.align(other, join="inner")
+    differences = (other - first).where(other != first, 0.0)  # both may be infinite
+    return differences.unstack("rest").to_numpy(np.float64)
 
 
 def labelled(sweep: Sweep, names: Sequence[str]) -> str:

@@ -55,6 +55,10 @@ class Measure(NamedTuple):
     unit: str = "–"
     lower_is_better: bool = True
 
+    def compared(self, pairs: Iterable[Pair], settings: ReportSettings) -> tuple[Comparison, ...]:
+        """Compare pairs of conditions in this quantity."""
+        return compared(pairs, self.values, settings, lower_is_better=self.lower_is_better)
+
 
 class Family(NamedTuple):
     """Conditions that are compared with each other."""
@@ -82,7 +86,7 @@ def compare_families(
 ) -> tuple[FamilyComparison, ...]:
     """Compare every family in every quantity."""
     return tuple(
-        FamilyComparison(measure, family, _compared(family.pairs, measure, settings))
+        FamilyComparison(measure, family, measure.compared(family.pairs, settings))
         for measure, family in itertools.product(measures, tuple(families))
     )
 
@@ -136,7 +140,7 @@ def compared_with_controls(
             rows = [
                 row._replace(quantity=each.name)
                 for each in measures
-                for row in _compared([(first, second)], each, settings)
+                for row in each.compared([(first, second)], settings)
             ]
             if rows:
                 yield f"{first.label} against {second.label}", tuple(adjusted(rows))
@@ -159,19 +163,9 @@ def compared(
 
     Pairs without runs of both are left out. `named` gives the name of a pair's row.
     """
-    return _compared(pairs, Measure("", values, "", lower_is_better), settings, named)
-
-
-def _compared(
-    pairs: Iterable[Pair],
-    measure: Measure,
-    settings: ReportSettings,
-    named: Callable[[ConditionResults, ConditionResults], str] = lambda first, second: second.label,
-) -> tuple[Comparison, ...]:
     rows = []
     for pair in pairs:
-        x, y = (own[~np.isnan(own)] for own in map(measure.values, pair))
+        x, y = (own[~np.isnan(own)] for own in map(values, pair))
         if len(x) and len(y):
-            name = named(*pair)
-            rows.append(compare(name, x, y, measure.lower_is_better, settings.confidence))
+            rows.append(compare(named(*pair), x, y, lower_is_better, settings.confidence))
     return tuple(adjusted(rows))

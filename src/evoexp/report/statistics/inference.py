@@ -72,7 +72,7 @@ class Proportion(NamedTuple):
 class Effect(NamedTuple):
     """Vargha and Delaney's A12 = P(x > y) + P(x = y) / 2 of two independent samples, tested."""
 
-    a12: float  # NaN if a sample is empty
+    a12: float
     interval: Interval
     p_value: float  # two-sided, of A12 = 1/2
 
@@ -92,26 +92,23 @@ def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
 
     NaN is ignored, ±inf is a value; NaN where a row has no values.
     """
-    found = np.full((len(shares), len(values)), np.nan)
     if values.shape[1] == 0:
-        return found
-    ordered, rows = np.sort(values, axis=1), np.arange(len(values))  # NaN comes last
-    last = np.count_nonzero(~np.isnan(values), axis=1) - 1
-    for own, share in zip(found, shares, strict=True):
-        position = share * np.maximum(last, 0)
-        below = np.floor(position).astype(np.int64)
-        low, high = (ordered[rows, np.minimum(k, np.maximum(last, 0))] for k in (below, below + 1))
-        fraction = position - below
-        between = (fraction != 0.0) & (low != high) & (last >= 0)
-        own[last >= 0] = low[last >= 0]
-        with np.errstate(invalid="ignore"):  # NaN lies between −inf and inf
-            own[between] += fraction[between] * (high[between] - low[between])
-    return found
+        return np.full((len(shares), len(values)), np.nan)
+    ordered = np.sort(values, axis=1)  # NaN comes last
+    last = np.maximum(np.count_nonzero(~np.isnan(values), axis=1) - 1, 0)
+    position = np.outer(shares, last)
+    low, high = (
+        np.take_along_axis(ordered, ends(position).astype(np.int64).T, axis=1).T
+        for ends in (np.floor, np.ceil)
+    )
+    with np.errstate(invalid="ignore"):  # NaN lies between −inf and inf
+        between = low + (position - np.floor(position)) * (high - low)
+    return np.where(low == high, low, between)
 
 
 def spread(values: FloatArray) -> Spread:
     """Return median and quartiles of values (n,)."""
-    median, lower, upper = (quantile(values, share) for share in (0.5, 0.25, 0.75))
+    median, lower, upper = quantiles(values[None], (0.5, 0.25, 0.75))[:, 0].tolist()
     return Spread(median, lower, upper, int(np.count_nonzero(~np.isnan(values))))
 
 
@@ -170,13 +167,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def vargha_delaney(x: FloatArray, y: FloatArray) -> float:
-    """Return A12 = P(x > y) + P(x = y) / 2 of values (n,) and (m,); NaN if either is empty."""
-    if not len(x) or not len(y):
-        return math.nan
-    return float(np.sum(_placements(x, y)) / (len(x) * len(y)))  # halves add without rounding
-
-
 def _placements(x: FloatArray, y: FloatArray) -> FloatArray:
     """Return how many of y (m,) lie below each of x (n,); equal ones count half."""
     ordered = np.sort(y)
@@ -185,16 +175,15 @@ def _placements(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
-    """Compare two independent samples (n,) and (m,) without NaN (Brunner and Munzel 2000).
+    """Compare two samples (n,) and (m,) of at least one value, without NaN (Brunner, Munzel 2000).
 
     Values are ranked: an infinite one, of a run that never got there, is the worst and no more.
     Small samples are tested by Mann and Whitney, and separated ones, in which every x lies on one
     side of every y, by the number of ways to choose the first; these have Newcombe's interval, as
     their placements do not vary.
     """
-    a12, smallest = vargha_delaney(x, y), min(len(x), len(y))
-    if smallest == 0:
-        return Effect(a12, Interval(a12, a12), 1.0)
+    n, m = len(x), len(y)
+    a12 = float(np.sum(_placements(x, y)) / (n * m))  # halves add without rounding
     # squared standard errors of A12, from the places of either sample in the other
     errors = [
         float(np.var(_placements(a, b), ddof=1)) / (len(a) * len(b) ** 2) if len(a) > 1 else 0.0
@@ -202,10 +191,9 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
     ]
     # separated samples: two of all ways to choose the first one's ranks; of thousands of runs there
     # are more ways than a float can count, so here is their logarithm, the same in either order
-    n, m = len(x), len(y)
     ways = math.lgamma(n + m + 1) - (math.lgamma(n + 1) + math.lgamma(m + 1))
     least_p = min(1.0, max(2.0 * math.exp(-ways), sys.float_info.min))
-    if smallest == 1 or sum(errors) == 0.0:
+    if min(n, m) == 1 or sum(errors) == 0.0:
         p_value = least_p if a12 in (0.0, 1.0) else 1.0
         return Effect(a12, _newcombe_interval(a12, n, m, confidence), p_value)
     error = math.sqrt(sum(errors))
@@ -213,7 +201,7 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
     # symmetric in log(a12 / (1 - a12)): near 0 and 1 the plain interval holds A12 too seldom
     half = special.stdtrit(degrees, 0.5 + 0.5 * confidence) * error / (a12 * (1.0 - a12))
     low, high = special.expit(special.logit(a12) + half * np.array([-1.0, 1.0]))
-    if smallest < LEAST_FOR_T:
+    if min(n, m) < LEAST_FOR_T:
         p_value = float(stats.mannwhitneyu(x, y).pvalue)
     else:
         p_value = 2.0 * float(special.stdtr(degrees, -abs(a12 - 0.5) / error))

@@ -38,12 +38,12 @@ class Hearing(NamedTuple):
 
     def every(self, evidence: Evidence, holds: int, done: int, planned: int) -> Claim:
         """Judge a claim about every run."""
-        size = self._share("share of runs", holds, done, 1.0)
+        size = self._share(holds, done, 1.0)
         return self._claim("every", evidence, done, 0 < planned <= done, holds < done, size)
 
     def majority(self, evidence: Evidence, holds: int, done: int) -> Claim:
         """Judge a claim that is reproduced if it holds in more than half of the runs."""
-        most, size = holds > done / 2, self._share("share of runs", holds, done, 0.5)
+        most, size = holds > done / 2, self._share(holds, done, 0.5)
         return self._claim("majority", evidence, done, most, bool(done) and not most, size)
 
     def above(self, share: Proportion, level: float) -> Claim:
@@ -69,7 +69,7 @@ class Hearing(NamedTuple):
             rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         )
         counted, would_do = row and row.num_runs, row and row.runs_to_decide(self.significance)
-        judged = counted, says == 1, says == -1, self._effect([row] if row else []), would_do
+        judged = counted, says == 1, says == -1, _least_effect([row] if row else []), would_do
         return heard._claim("better", told.replace("{}", words), *judged)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
@@ -77,13 +77,13 @@ class Hearing(NamedTuple):
         says = {row.says(self.significance) for row in rows}
         undecided = [row for row in rows if not row.says(self.significance)]
         would_do = max((row.runs_to_decide(self.significance) for row in undecided), default=None)
-        judged = _runs(rows), says == {1}, -1 in says, self._effect(rows), would_do
+        judged = _runs(rows), says == {1}, -1 in says, _least_effect(rows), would_do
         return self._claim("better than all", evidence, *judged)
 
     def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
         """Judge a claim that one of several settings is the best."""
         says = {row.says(self.significance) for row in rows}
-        holds, size = best_median and 1 in says, self._effect(rows)
+        holds, size = best_median and 1 in says, _least_effect(rows)
         return self._claim("best", evidence, _runs(rows), holds, -1 in says, size)
 
     def greater(
@@ -120,30 +120,14 @@ class Hearing(NamedTuple):
         """Return the claim unjudged: another experiment judges it, or nothing can."""
         return self.made(evidence, "–", NOT_JUDGED)
 
-    def _share(self, name: str, holds: int, done: int, neutral: float) -> EffectSize | None:
-        if not done:
-            return None
+    def _share(self, holds: int, done: int, neutral: float) -> EffectSize | None:
         own = Proportion(holds, done)
-        return EffectSize(name, own.share, *own.interval(1.0 - self.significance), neutral)
+        ends = own.interval(1.0 - self.significance)
+        return EffectSize("share of runs", own.share, *ends, neutral) if done else None
 
     def _difference(self, one: Proportion, two: Proportion) -> EffectSize:
         ends = newcombe(one, two, 1.0 - self.significance)
-        return EffectSize(
-            "difference of shares",
-            one.share - two.share,
-            *ends,
-            0.0,
-            self.rule.limits.get("equal", 0.0),
-        )
-
-    def _effect(self, rows: Sequence[Comparison]) -> EffectSize | None:
-        """Return the least A12 of some comparisons."""
-        if not rows:
-            return None
-        least = min((row.better for row in rows), key=lambda each: each.a12)
-        return EffectSize(
-            "A12", least.a12, *least.interval, 0.5, self.rule.limits.get("equal", 0.0)
-        )
+        return EffectSize("difference of shares", one.share - two.share, *ends, 0.0)
 
     def _claim(
         self,
@@ -162,8 +146,9 @@ class Hearing(NamedTuple):
         if reason:
             return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
         verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else UNDECIDED
-        if size is not None and size.is_negligible:
-            verdict = EQUAL
+        if size is not None:
+            size = size._replace(equal=self.rule.limits.get("equal", 0.0))
+            verdict = EQUAL if size.is_negligible else verdict
         claim = self.made(evidence, n, verdict)._replace(size=size)
         if verdict != UNDECIDED or would_decide is None:
             return claim
@@ -178,6 +163,12 @@ class Hearing(NamedTuple):
         rule, counted = self.rule, "0" if n is None else str(n)
         told = evidence if isinstance(evidence, str) else markdown.filled(rule.evidence, evidence)
         return Claim(rule.claim, rule.source, told, verdict, rule.name, rule.text, counted)
+
+
+def _least_effect(rows: Sequence[Comparison]) -> EffectSize | None:
+    """Return the least A12 of some comparisons."""
+    effects = sorted((row.better for row in rows), key=lambda each: each.a12)
+    return next((EffectSize("A12", each.a12, *each.interval, 0.5) for each in effects), None)
 
 
 def _runs(rows: Sequence[Comparison]) -> str:

@@ -113,7 +113,7 @@ def _run(
     )
     with progress.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
-            progress.advance(outcome)
+            progress.count(outcome)
             if outcome.reason:
                 failures.append(outcome)
                 failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
@@ -139,7 +139,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
             return f"{directory / 'index.html'} (as it was)"
-        from evoexp.commands.report_requests import request_of  # pandas, where there is no need
+        from evoexp.commands.report import request_of  # pandas, where there is no need
 
         page = request_of(experiment, *asked).write()
         note.write_text(_drawn_from(experiment, asked, sources, directory))

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from evoexp.commands import site
 from evoexp.commands.arguments import folder_words, is_override
 from evoexp.commands.command_parser import command_parser
 from evoexp.commands.console import say, say_each
 from evoexp.commands.pack import unpacked
-from evoexp.commands.site import home_files, write_site
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
@@ -79,11 +79,11 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
     failed: list[str] = []
     reports = _drawn(planned, failed)
     if arguments.check:
-        code = _check(itertools.chain(reports, (home_files() for _ in range(1))))
+        code = _check(itertools.chain(reports, (site.home_files() for _ in range(1))))
         return 1 if failed else code
     for report in reports:
         say(f"report: {build.write_report(report)}")
-    write_site()
+    site.main(arguments)
     return 1 if failed else 0
 
 

@@ -4,7 +4,7 @@ import argparse
 import shlex
 from pathlib import Path
 
-from evoexp.commands.arguments import folder_words
+from evoexp.commands.arguments import option_words
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.commands.pack import unpacked
 from evoexp.commands.report import ReportRequest, chosen, folder_name
@@ -86,9 +86,8 @@ def drawn(
 
 def _asked(arguments: argparse.Namespace) -> ReportRequest:
     """Return the request of the page."""
-    words = shlex.join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
-    words += f" --only {shlex.quote(','.join(arguments.only))}" if arguments.only else ""
-    words = " ".join([words, *folder_words(arguments.config_dir)])
+    again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
+    words = shlex.join([*arguments.overrides, *again])
     runs, experiments, _, settings = chosen(arguments)
     settings = settings.model_copy(update={"figures": "comparison"})
     names, title, budget, num_replicates = [*runs], "", "", None

@@ -1,13 +1,13 @@
 """The console that commands print on: readable at any width, exact when piped; and JSON."""
 
 import json
-import math
 import os
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import orjson
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
@@ -84,17 +84,13 @@ def right(*names: str) -> list[Column]:
 
 def print_json(value: Any) -> None:
     """Print valid JSON: numbers that are not finite, which JSON does not have, become null."""
-    print(json.dumps(_plain(value), indent=2, allow_nan=False))
+    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
+    plain = orjson.loads(orjson.dumps(value, _plain, options))
+    print(json.dumps(plain, indent=2))  # which any terminal can show
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that JSON can hold: scalars of numpy as Python's, other values as text."""
+    """Return what JSON can hold of a value of a kind of our own: other values as text."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "dtype") and hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if isinstance(value, bool | int | float | str | None) else str(value)
+        return dict(value)
+    return list(value) if isinstance(value, tuple) else str(value)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.commands import site
-from evoexp.commands.arguments import folder_words, is_override
+from evoexp.commands.arguments import is_override, option_words
 from evoexp.commands.command_parser import command_parser
 from evoexp.commands.console import say, say_each
 from evoexp.commands.pack import unpacked
@@ -192,9 +192,7 @@ def request_of(
     words = files if any(map(is_file, files)) else words
     words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
     words += [word for word in overrides if word.split("=")[0] not in _SILENT]
-    words += ["--only", ",".join(only)] if only else []
-    words += ["-m"] if multirun else []
-    words += folder_words(config_dir)
+    words += option_words(multirun, only, config_dir)
     request = build.Request(
         experiment.report_name,
         experiment.name,

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import folder_words
+from evoexp.commands.arguments import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.list_ import run_row, run_table
 from evoexp.commands.progress import BatchProgress
@@ -46,9 +46,8 @@ def main(arguments: argparse.Namespace) -> int:
     experiments = compose.expand(arguments.overrides, multirun=multirun, only=only)
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    words = [*(["-m"] if multirun else []), *arguments.overrides]
-    words += ["--only", ",".join(only)] if only else []
-    command = shlex.join(["evoexp", "run", *words, *folder_words(arguments.config_dir)])
+    words = [*arguments.overrides, *option_words(multirun, only, arguments.config_dir)]
+    command = shlex.join(["evoexp", "run", *words])
     wanted = [
         (
             labelled.condition,

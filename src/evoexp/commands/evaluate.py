@@ -36,7 +36,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Print terms and exact verdict of the motion; conditions that say the same share a column."""
     fitting = _motions(arguments)
     if arguments.write is not None:
-        if fitting[0].is_trajectory:
+        if not fitting[0].solution.size:
             raise MotionFileError("--write: must go with a solution, was given with a trajectory")
         planner, problem = fitting[0].condition.prepare()
         lists = nested(fitting[0].solution, planner.shape(problem))

@@ -90,7 +90,7 @@ def print_json(value: Any) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return what JSON can hold of a value of a kind of our own: other values as text."""
+    """Return a value that orjson does not know as a plain one: as text, if it is no collection."""
     if isinstance(value, Mapping):
         return dict(value)
     return list(value) if isinstance(value, tuple) else str(value)

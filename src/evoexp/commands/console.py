@@ -1,13 +1,13 @@
 """The console that commands print on: readable at any width, exact when piped; and JSON."""
 
 import json
+import math
 import os
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import orjson
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
@@ -84,13 +84,17 @@ def right(*names: str) -> list[Column]:
 
 def print_json(value: Any) -> None:
     """Print valid JSON: numbers that are not finite, which JSON does not have, become null."""
-    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
-    plain = orjson.loads(orjson.dumps(value, _plain, options))
-    print(json.dumps(plain, indent=2))  # which any terminal can show
+    print(json.dumps(_plain(value), indent=2, allow_nan=False))
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that orjson does not know as a plain one: as text, if it is no collection."""
+    """Return a value that JSON can hold: scalars of numpy as Python's, other values as text."""
     if isinstance(value, Mapping):
-        return dict(value)
-    return list(value) if isinstance(value, tuple) else str(value)
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "dtype") and hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, bool | int | float | str | None) else str(value)

@@ -41,7 +41,7 @@ def test_a_pipe_has_lines() -> None:
     progress = BatchProgress(out, WANTED, clock=lambda: clock[0])
     with progress.shown():
         for clock[0], key, cost in ((60.0, "a", 5.0), (70.0, "b", 5.0), (71.0, "a", None)):
-            progress.advance(outcome(key, cost))
+            progress.count(outcome(key, cost))
     assert lines(out) == [
         "replicates: 1 of 5 done, 0 failed, ETA –",  # the first one compiles
         "replicates: 2 of 5 done, 0 failed, ETA 30 s",
@@ -54,7 +54,7 @@ def test_a_terminal_has_a_row_per_condition() -> None:
     progress = BatchProgress(out, WANTED)
     with progress.shown():
         for key, cost in (("a", 5.0), ("a", 3.0), ("b", None)):
-            progress.advance(outcome(key, cost))
+            progress.count(outcome(key, cost))
     first, second, total = lines(out)[-4:-1]
     assert "via-point GA" in first and "2/3 0 failed best 3" in first
     assert "[bold]random search" in second and "1/2 1 failed" in second
@@ -67,7 +67,7 @@ def test_of_many_conditions_the_last_ones_are_shown() -> None:
     progress = BatchProgress(out, {str(k): (f"condition {k}", 1) for k in range(40)})
     with progress.shown():
         for k in range(40):
-            progress.advance(outcome(str(k), 1.0))
+            progress.count(outcome(str(k), 1.0))
     shown = [line for line in lines(out)[-MOST_ROWS - 3 :] if "condition" in line]
     assert "condition 28 " in shown[0] and "condition 39 " in shown[-1]
     assert len(shown) == MOST_ROWS
@@ -97,7 +97,7 @@ def test_workers_leave_curves_that_are_shown(tmp_path: Path, heard: Callable[...
     out = console(is_terminal=True)
     progress = BatchProgress(out, WANTED, tmp_path)
     with progress.shown():
-        progress.advance(outcome("a", 5.0))
+        progress.count(outcome("a", 5.0))
     (row,) = [line for line in lines(out)[-4:] if "random search" in line]
     assert f"{curve.generation} {drawn(curve.costs)}" in row
 

@@ -181,7 +181,6 @@ def test_large_stores_are_checked_by_workers(
     evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verify, "LARGE", 1)
-    monkeypatch.setattr(verify, "PART", 1)
     flip(run.log_path(1))
     said = evoexp("verify", "--json")
     assert said.code == 1

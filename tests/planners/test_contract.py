@@ -6,7 +6,7 @@ import pytest
 from evoexp.records import flatten
 from evoexp.store.log_reader import read_summary
 from evoexp.testing import CHECKS, Check
-from evoexp.testing.evolution_record import finished
+from evoexp.testing.contract import finished
 from shipped_conditions import KIND_EXAMPLES, Kind, of_kind
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evoexp.planners import answers
-from evoexp.testing.evolution_record import evolution
+from evoexp.testing.contract import evolution
 from shipped_conditions import of_kind
 
 DISTURBED = [  # (experiment and its condition, place in the flat solution, by how much, phrase)

@@ -157,7 +157,7 @@ def test_thousands_of_runs_are_compared(shift: float) -> None:
     assert 0.0 < effect(x + shift, x, 0.95).p_value <= 1.0
 
 
-def test_effect_of_equal_and_of_no_values() -> None:
+def test_effect_of_equal_values() -> None:
     same = effect(np.ones(30), np.ones(20), 0.95)
     assert (same.a12, same.p_value, same.direction) == (0.5, 1.0, 0)
     assert same.interval.low < 0.5 < same.interval.high

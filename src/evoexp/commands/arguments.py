@@ -8,9 +8,12 @@ from pathlib import Path
 MOTION_ENDINGS = (".json", ".npy", ".csv", ".yaml", ".yml")
 
 
-def folder_words(config_dir: Sequence[str]) -> list[str]:
-    """Return the words that give the same folders of options when a command is typed again."""
-    return [word for folder in config_dir for word in ("--config-dir", folder)]
+def option_words(
+    multirun: bool = False, only: Sequence[str] = (), config_dir: Sequence[str] = ()
+) -> list[str]:
+    """Return the words that give the same options when a command is typed again."""
+    folders = [word for folder in config_dir for word in ("--config-dir", folder)]
+    return [*["-m"] * multirun, *(["--only", ",".join(only)] if only else []), *folders]
 
 
 def is_override(word: str) -> bool:

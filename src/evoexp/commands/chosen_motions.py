@@ -42,11 +42,6 @@ class FittingMotion(NamedTuple):
     motion: Motion | None  # None: the solution has none
     remarks: tuple[str, ...] = ()  # on how a trajectory was read
 
-    @property
-    def is_trajectory(self) -> bool:
-        """Whether the file holds a joint trajectory, of which a planner knows no terms."""
-        return not self.solution.size
-
 
 # words of the command line
 

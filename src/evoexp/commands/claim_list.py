@@ -7,7 +7,7 @@ from typing import Any
 from rich.table import Column
 
 from evoexp.commands.console import new_table, print_json, say
-from evoexp.commands.report_requests import request_of
+from evoexp.commands.report import request_of
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from evoexp.batch.replicate_limits import allowed_addresses, used_addresses
+from evoexp.batch.replicate_limits import allowed_addresses
 from evoexp.errors import DamagedStore, printable
 from evoexp.numeric.cache_folder import remove_at_exit
 
@@ -30,7 +30,6 @@ PREFIX = "evoexp-command-"
 LOCK = "owner.lock"
 MEGABYTE = 10**6
 LEAST_MB = 2_500  # [MB] of addresses; a shipped run that compiles its kernels took 2,219
-LARGEST_MB = 400  # [MB] of addresses that loading one library and its kernels takes, at most
 _TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new thread", "bad_alloc")
 
 
@@ -77,28 +76,18 @@ def memory_shortage(error: BaseException) -> str:
     while cause is not None and cause not in chain:
         chain.append(cause)
         cause = cause.__cause__ or cause.__context__
-    texts = [
-        _first_line(each) or "the system gives no more"
-        for each in chain
-        if isinstance(each, MemoryError)
-        or (isinstance(each, OSError) and each.errno == errno.ENOMEM)
-        or any(text in str(each).lower() for text in _TEXTS)
-    ]
-    allowed = allowed_addresses()
-    if not texts and isinstance(error, ImportError | OSError | RuntimeError | SystemError):
-        is_little = allowed is not None and allowed - used_addresses() < LARGEST_MB * MEGABYTE
-        texts = [_first_line(error)] if is_little else []
+    texts = []
+    for each in chain:
+        lines = [line.strip() for line in str(each).splitlines() if line.strip()]
+        named = [line for line in lines if any(text in line.lower() for text in _TEXTS)]
+        is_named = isinstance(each, OSError) and each.errno == errno.ENOMEM
+        if named or is_named or isinstance(each, MemoryError):
+            texts.append((named or lines or ["the system gives no more"])[0])
     if not texts:
         return ""
+    allowed = allowed_addresses()
     limit = f" (`ulimit -v` allows {allowed // MEGABYTE:,} MB)" if allowed is not None else ""
     return f"out of memory: {texts[-1]}{limit}"
-
-
-def _first_line(error: BaseException) -> str:
-    """Return the line of an error that names the memory, else its first one."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    named = [line for line in lines if any(text in line.lower() for text in _TEXTS)]
-    return (named or lines or [""])[0]
 
 
 def open_streams() -> None:

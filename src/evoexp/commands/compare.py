@@ -1,14 +1,13 @@
 """`evoexp compare`: planners in one currency, by answers that the exact certifier proves."""
 
 import argparse
-import hashlib
 import shlex
 from pathlib import Path
 
-from evoexp.commands.arguments import folder_words
+from evoexp.commands.arguments import option_words
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.commands.pack import unpacked
-from evoexp.commands.report_requests import MAX_NAMED, ReportRequest, chosen
+from evoexp.commands.report import ReportRequest, chosen, folder_name
 from evoexp.condition import Condition
 from evoexp.configuration.labels import SAME
 from evoexp.errors import SettingError
@@ -87,30 +86,21 @@ def drawn(
 
 def _asked(arguments: argparse.Namespace) -> ReportRequest:
     """Return the request of the page."""
-    words = shlex.join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
-    words += f" --only {shlex.quote(','.join(arguments.only))}" if arguments.only else ""
-    words = " ".join([words, *folder_words(arguments.config_dir)])
+    again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
+    words = shlex.join([*arguments.overrides, *again])
     runs, experiments, _, settings = chosen(arguments)
     settings = settings.model_copy(update={"figures": "comparison"})
-    if runs:
-        name = _name("+".join(runs), len(runs))
-        request = build.Request(name, "", "", tuple(runs.items()), words, None, "compare")
-        return ReportRequest(request, settings, None)
-    rows: dict[str, tuple[str, Condition]] = {}  # experiments share conditions
-    for experiment in experiments:
+    names, title, budget, num_replicates = [*runs], "", "", None
+    if experiments:
+        names = [experiment.report_name for experiment in experiments]
+        title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
+        budget, num_replicates = experiments[0].budget, experiments[0].num_replicates
+    rows: dict[str, tuple[str, Condition]] = {run.id: (name, run) for name, run in runs.items()}
+    for experiment in experiments:  # which share conditions
         for label, condition in experiment.conditions:
             name = f"{experiment.name}: {label}" if len(experiments) > 1 else label
             before = [rows[condition.id][0]] if condition.id in rows else []
             rows[condition.id] = SAME.join([*before, name]), condition
-    first = experiments[0]
-    name = _name("+".join(experiment.report_name for experiment in experiments), len(experiments))
-    title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
-    request = build.Request(name, title, first.budget, tuple(rows.values()), words, None, "compare")
-    return ReportRequest(request, settings, first.num_replicates)
-
-
-def _name(parts: str, count: int) -> str:
-    """Return the name of the page's folder."""
-    if count > MAX_NAMED:
-        parts = f"{count}+{hashlib.sha256(parts.encode()).hexdigest()[:8]}"
-    return f"compare_{parts}"
+    folder = f"compare_{folder_name(names)}"
+    request = build.Request(folder, title, budget, tuple(rows.values()), words, None, "compare")
+    return ReportRequest(request, settings, num_replicates)

@@ -36,7 +36,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Print terms and exact verdict of the motion; conditions that say the same share a column."""
     fitting = _motions(arguments)
     if arguments.write is not None:
-        if fitting[0].is_trajectory:
+        if not fitting[0].solution.size:
             raise MotionFileError("--write: must go with a solution, was given with a trajectory")
         planner, problem = fitting[0].condition.prepare()
         lists = nested(fitting[0].solution, planner.shape(problem))
@@ -112,15 +112,15 @@ def _tables(columns: list[list[dict[str, Any]]], width: int) -> list[Table]:
     longest_word = max(len(word) for row in rows for word in row["label"].split())
     column = min(max(12, longest_word), 40) + 3
     count = max(1, (width - max(map(len, names)) - 4) // column)
-    return [_table(columns[k : k + count], names) for k in range(0, len(columns), count)]
-
-
-def _table(columns: list[list[dict[str, Any]]], names: list[str]) -> Table:
-    heads = [[f"{row['label']}\n{row['condition'][:12]}" for row in group] for group in columns]
-    table = new_table("", Column(no_wrap=True), *right(*map("\n".join, heads)))
-    for name in names:
-        table.add_row(name, *(_cell(group[0].get(name)) for group in columns))
-    return table
+    tables = []
+    for k in range(0, len(columns), count):
+        shown = columns[k : k + count]
+        heads = [[f"{row['label']}\n{row['condition'][:12]}" for row in group] for group in shown]
+        table = new_table("", Column(no_wrap=True), *right(*map("\n".join, heads)))
+        for name in names:
+            table.add_row(name, *(_cell(group[0].get(name)) for group in shown))
+        tables.append(table)
+    return tables
 
 
 def _cell(value: Any) -> str:

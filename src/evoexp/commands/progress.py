@@ -11,7 +11,6 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
-    TaskID,
     TextColumn,
     TimeRemainingColumn,
 )
@@ -32,19 +31,10 @@ LIVE_NOTE = (
 )
 
 
-class _Bars(Progress):
-    """Bars that look for news before they are drawn."""
-
-    look: Callable[[], None] = staticmethod(lambda: None)
-
-    def get_renderables(self) -> Iterable[RenderableType]:
-        """Return the bars, with the latest news."""
-        self.look()
-        return super().get_renderables()
-
-
-class BatchProgress:
+class BatchProgress(Progress):
     """Counts replicates done and failed, condition by condition, and says when the rest will be."""
+
+    _curves: Path | None = None
 
     def __init__(
         self,
@@ -61,7 +51,7 @@ class BatchProgress:
         """
         texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
         texts += ["{task.fields[curve]}"] if curves is not None else []
-        self._bars = _Bars(
+        super().__init__(
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=10),
             MofNCompleteColumn(),
@@ -71,38 +61,37 @@ class BatchProgress:
             get_time=clock,
             speed_estimate_period=SPEED_OVER_S,
         )
-        self._bars.look = self._read_curves
-        self._console, self._curves, self._clock = console, curves, clock
-        self._tasks = {key: self._row(*each, visible=False) for key, each in wanted.items()}
-        self._all = self._row("replicates", sum(total for _, total in wanted.values()))
+        self._curves, self._last_line = curves, clock()
+        self._rows = {
+            key: self.add_task(label, total=total, visible=False, failed=0, best="", curve="")
+            for key, (label, total) in wanted.items()
+        }
+        total = sum(total for _, total in wanted.values())
+        self._all = self.add_task("replicates", total=total, failed=0, best="", curve="")
         self._best = dict.fromkeys(wanted, np.inf)
         self._failed = dict.fromkeys(wanted, 0)
         self._known: dict[str, Curve] = {}
         self._last_shown: dict[str, None] = {}  # conditions on the screen, the newest last
-        self._last_line = clock()
-
-    def _row(self, label: str, total: int, *, visible: bool = True) -> TaskID:
-        return self._bars.add_task(label, total=total, visible=visible, failed=0, best="", curve="")
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
         """Show it while the body runs; leave its last state."""
-        if not self._console.is_terminal:
+        if not self.console.is_terminal:
             try:
                 yield
             finally:
-                if self._bars.tasks[-1].completed:
+                if self.tasks[-1].completed:
                     self._say()
             return
         if self._curves is not None:
-            self._console.print(LIVE_NOTE)
+            self.console.print(LIVE_NOTE)
         try:
-            with self._bars:
+            with self:
                 yield
         finally:
-            self._console.show_cursor(True)  # also where the end was interrupted
+            self.console.show_cursor(True)  # also where the end was interrupted
 
-    def advance(self, outcome: Outcome) -> None:
+    def count(self, outcome: Outcome) -> None:
         """Count one replicate."""
         key = outcome.condition_id
         self._failed[key] += bool(outcome.reason)
@@ -110,10 +99,10 @@ class BatchProgress:
             self._best[key] = min(self._best[key], outcome.summary.best_cost)
         best = f"best {self._best[key]:.4g}" if np.isfinite(self._best[key]) else ""
         self._show_row(key)
-        self._bars.update(self._tasks[key], advance=1, failed=self._failed[key], best=best)
-        self._bars.update(self._all, advance=1, failed=sum(self._failed.values()))
-        now = self._clock()
-        if not self._console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
+        self.update(self._rows[key], advance=1, failed=self._failed[key], best=best)
+        self.update(self._all, advance=1, failed=sum(self._failed.values()))
+        now = self.get_time()
+        if not self.console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
             self._last_line = now
             self._say()
 
@@ -121,31 +110,32 @@ class BatchProgress:
         """Show a condition; the one that nothing was heard of for the longest time makes room."""
         self._last_shown.pop(key, None)
         self._last_shown[key] = None
-        self._bars.update(self._tasks[key], visible=True)
+        self.update(self._rows[key], visible=True)
         if len(self._last_shown) > MOST_ROWS:
             oldest = next(iter(self._last_shown))
             del self._last_shown[oldest]
-            self._bars.update(self._tasks[oldest], visible=False)
+            self.update(self._rows[oldest], visible=False)
 
-    def _read_curves(self) -> None:
-        """Draw the curves that the workers left."""
-        levels = LEVELS if self._console.encoding.startswith("utf") else PLAIN_LEVELS
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """Return the bars, with the curves that the workers left."""
         for curve in [] if self._curves is None else read_curves(self._curves):
+            levels = LEVELS if self.console.encoding.startswith("utf") else PLAIN_LEVELS
             key = curve.condition_id
-            if key in self._tasks and self._known.get(key) != curve:
+            if key in self._rows and self._known.get(key) != curve:
                 self._known[key] = curve
                 self._show_row(key)
                 text = f"{curve.generation} {drawn(curve.costs, levels)}"
-                self._bars.update(self._tasks[key], curve=text)
+                self.update(self._rows[key], curve=text)
+        return super().get_renderables()
 
     def _say(self) -> None:
-        total, failed = self._bars.tasks[-1], sum(self._failed.values())
+        total, failed = self.tasks[-1], sum(self._failed.values())
         done, seconds = int(total.completed) - failed, total.time_remaining
         rest = "–" if seconds is None else f"{seconds:.0f} s"
         if seconds is not None and seconds >= MINUTES_FROM_S:
             rest = f"{seconds / 60:.0f} min"
         text = f"replicates: {done} of {total.total:.0f} done, {failed} failed, ETA {rest}"
-        self._console.print(text, soft_wrap=True)
+        self.console.print(text, soft_wrap=True)
 
 
 def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH) -> str:

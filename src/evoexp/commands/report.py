@@ -3,29 +3,52 @@
 import argparse
 import contextlib
 import functools
+import hashlib
 import io
 import itertools
+import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from evoexp.commands import compare
+from evoexp.commands import site
+from evoexp.commands.arguments import is_override, option_words
 from evoexp.commands.command_parser import command_parser
 from evoexp.commands.console import say, say_each
 from evoexp.commands.pack import unpacked
-from evoexp.commands.report_requests import request_of, requests
-from evoexp.commands.site import home_files, write_site
+from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.configuration.search_path import options, searched_first
-from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError
+from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import is_file, options, searched_first
+from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError, UnknownOption
 from evoexp.report.pages import build
 from evoexp.report.pages.home_page import summaries
+from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import shipped
-from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
 PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
 CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
+MAX_NAMED = 4  # runs whose hashes a report's name spells out
+_HASH = re.compile("[0-9a-fA-F]{4,64}")
+_SILENT = ("experiment", "budget", "runner")  # overrides that a report's command need not repeat
+
+
+class ReportRequest(NamedTuple):
+    """A report before it is drawn."""
+
+    request: build.Request
+    settings: ReportSettings
+    num_replicates: int | None  # planned for every condition; None: as many as each one has
+
+    def files(self) -> build.ReportFiles:
+        """Draw it; nothing is written."""
+        return build.derived(self.request, self.settings, outputs_root(), self.num_replicates)
+
+    def write(self) -> Path:
+        """Draw and write it; return the path of its page."""
+        return build.write_report(self.files())
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -46,8 +69,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _main_of_all(arguments: argparse.Namespace) -> int:
     """Draw all reports and the home page, or check them."""
-    given = [*arguments.overrides, *arguments.only, *(["-m"] if arguments.multirun else [])]
-    if given:
+    if given := [*arguments.overrides, *arguments.only, *["-m"] * arguments.multirun]:
         raise SettingError("--all", "given alone", " ".join(given))
     planned = list(planned_reports(outputs_root()))
     if not planned:
@@ -57,13 +79,12 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
     failed: list[str] = []
     reports = _drawn(planned, failed)
     if arguments.check:
-        code = _check(itertools.chain(reports, (home_files() for _ in range(1))))
-    else:
-        code = 0
-        for report in reports:
-            say(f"report: {build.write_report(report)}")
-        write_site()
-    return 1 if failed else code
+        code = _check(itertools.chain(reports, (site.home_files() for _ in range(1))))
+        return 1 if failed else code
+    for report in reports:
+        say(f"report: {build.write_report(report)}")
+    site.main(arguments)
+    return 1 if failed else 0
 
 
 def _check(reports: Iterable[build.ReportFiles]) -> int:
@@ -104,6 +125,83 @@ def _with_claims(words: Sequence[str]) -> list[str]:
     if missing:
         say(f"nothing stored yet: {missing[:-1]}")
     return [name for word in words for name in (stored if word == CLAIMS else [word])]
+
+
+# what is asked for
+
+
+def chosen(
+    arguments: argparse.Namespace,
+) -> tuple[dict[str, Condition], list[Experiment], list[str], ReportSettings]:
+    """Return the stored runs, or experiments and overrides, that a command chooses, and settings.
+
+    Settings are those of the first experiment, of runs those of the paper's report.
+    """
+    multirun, only, known = arguments.multirun, arguments.only, options("experiment")
+    overrides = [word for word in arguments.overrides if is_override(word)]
+    names = [word for word in arguments.overrides if word not in overrides]
+    unknown = [name for name in names if name not in known and not is_file(name)]
+    if names and len(unknown) == len(names) and all(map(_HASH.fullmatch, names)):
+        if overrides or multirun or only:
+            must = "left out where runs are given by their hashes"
+            raise SettingError("overrides", must, " ".join([*overrides, *only]) or "-m")
+        runs = [resolve(outputs_root(), name) for name in names]
+        conditions = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
+        plain = compose.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
+        return conditions, [], [], plain.report
+    for name in unknown:
+        if len(unknown) < len(names) or not _HASH.fullmatch(name):
+            raise UnknownOption("experiment", name, known)
+    words = [f"experiment={','.join(names)}"] if names else []
+    experiments = compose.expand(
+        [*words, *overrides], multirun=multirun or len(names) > 1, only=only
+    )
+    return {}, experiments, overrides, experiments[0].report
+
+
+def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
+    """Return a report of every named experiment, or a single report of all named runs."""
+    runs, experiments, overrides, settings = chosen(arguments)
+    if runs:
+        name = folder_name([*runs], "_runs")
+        return [ReportRequest(build.Request(name, "", "", tuple(runs.items())), settings, None)]
+    return [
+        request_of(experiment, overrides, arguments.multirun, arguments.only, arguments.config_dir)
+        for experiment in experiments
+    ]
+
+
+def folder_name(parts: Sequence[str], noun: str = "") -> str:
+    """Return the names that a page combines, or, of many, their number and a hash."""
+    name = "+".join(parts)
+    if len(parts) > MAX_NAMED:
+        name = f"{len(parts)}{noun}+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+    return name
+
+
+def request_of(
+    experiment: Experiment,
+    overrides: Sequence[str],
+    multirun: bool = False,
+    only: Sequence[str] = (),
+    config_dir: Sequence[str] = (),
+) -> ReportRequest:
+    """Return the report of one experiment, whose command repeats the words that were typed."""
+    files = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
+    words = [experiment.name] if experiment.name in options("experiment") else []
+    words = files if any(map(is_file, files)) else words
+    words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
+    words += [word for word in overrides if word.split("=")[0] not in _SILENT]
+    words += option_words(multirun, only, config_dir)
+    request = build.Request(
+        experiment.report_name,
+        experiment.name,
+        experiment.budget,
+        experiment.conditions,
+        shlex.join(words),
+        experiment.options,
+    )
+    return ReportRequest(request, experiment.report, experiment.num_replicates)
 
 
 # all reports
@@ -160,8 +258,8 @@ def _budgets(outputs: Path, name: str) -> Iterator[str]:
         if not own and len(begun) < max(len(ids), 1):
             continue
         # `quick` has the hashes of the paper's budget
-        commands = [_words(str(_notes(run).get("command", ""))) for run in own or begun]
-        is_quick = budget == "paper" and all("budget=quick" in words for words in commands)
+        commands = [str(_notes(run).get("command")) for run in own or begun]
+        is_quick = budget == "paper" and all("budget=quick" in each.split() for each in commands)
         if is_quick:
             (quick,) = compose.expand([f"experiment={name}", "budget=quick"])
             is_quick = all(len(run.completed()) <= quick.num_replicates for run in own or begun)
@@ -177,9 +275,15 @@ def _notes(run: RunDirectory) -> dict[str, Any]:
 
 def _again(folder: str, command: str) -> build.ReportFiles:
     """Draw a report by the command that its page names; nothing is written."""
-    name, *words = _words(command)
+    from evoexp.commands import compare  # which takes what is asked for from here
+
+    no_command = StoreError(f"{folder}: names no command that draws it alone")
+    try:
+        name, *words = shlex.split(command)
+    except ValueError:
+        raise no_command from None
     if name not in ("report", "compare"):
-        raise StoreError(f"{folder}: names no command that draws it")
+        raise no_command
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(complaint):
@@ -191,12 +295,5 @@ def _again(folder: str, command: str) -> build.ReportFiles:
             return compare.drawn(arguments)[0]
         found = [] if arguments.all else requests(arguments)
         if len(found) != 1:
-            raise StoreError(f"{folder}: names no command that draws it alone")
+            raise no_command
         return found[0].files()
-
-
-def _words(command: str) -> list[str]:
-    try:
-        return shlex.split(command) or [""]
-    except ValueError:
-        return [""]

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import folder_words
+from evoexp.commands.arguments import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.list_ import run_row, run_table
 from evoexp.commands.progress import BatchProgress
@@ -46,9 +46,8 @@ def main(arguments: argparse.Namespace) -> int:
     experiments = compose.expand(arguments.overrides, multirun=multirun, only=only)
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    words = [*(["-m"] if multirun else []), *arguments.overrides]
-    words += ["--only", ",".join(only)] if only else []
-    command = shlex.join(["evoexp", "run", *words, *folder_words(arguments.config_dir)])
+    words = [*arguments.overrides, *option_words(multirun, only, arguments.config_dir)]
+    command = shlex.join(["evoexp", "run", *words])
     wanted = [
         (
             labelled.condition,
@@ -113,7 +112,7 @@ def _run(
     )
     with progress.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
-            progress.advance(outcome)
+            progress.count(outcome)
             if outcome.reason:
                 failures.append(outcome)
                 failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
@@ -139,7 +138,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
             return f"{directory / 'index.html'} (as it was)"
-        from evoexp.commands.report_requests import request_of  # pandas, where there is no need
+        from evoexp.commands.report import request_of  # pandas, where there is no need
 
         page = request_of(experiment, *asked).write()
         note.write_text(_drawn_from(experiment, asked, sources, directory))

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.commands.arguments import folder_words, is_override
+from evoexp.commands.arguments import is_override, option_words
 from evoexp.commands.console import (
     hash_column,
     new_table,
@@ -69,8 +69,8 @@ def main(arguments: argparse.Namespace) -> int:
     as_table = not (arguments.all or arguments.json)
     if any(map(is_override, words)):
         experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
-        swept = ["-m"] if arguments.multirun else []
-        command = ["evoexp", "run", *swept, *words, *folder_words(arguments.config_dir)]
+        again = option_words(arguments.multirun, (), arguments.config_dir)
+        command = ["evoexp", "run", *words, *again]
         labelled = [(each, label) for each in experiments for label, _ in each.conditions]
         if as_table and len(labelled) > 1:
             for experiment in experiments:

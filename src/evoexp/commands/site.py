@@ -21,13 +21,7 @@ MAX_NAMED = 4  # runs that are named as being written
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Write the page."""
-    write_site()
-    return 0
-
-
-def write_site() -> None:
-    """Write the home page, and name it."""
+    """Write the page, and name it."""
     directory, files = home_files()
     directory.mkdir(parents=True, exist_ok=True)
     write_file(directory / HTML, files[HTML])
@@ -47,6 +41,7 @@ def write_site() -> None:
             f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
             "their results are partial"
         )
+    return 0
 
 
 def home_files() -> ReportFiles:

@@ -15,13 +15,13 @@ MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
 
 def stored_runs(outputs: Path) -> list[tuple[str, RunDirectory | EvoexpError]]:
     """Return all stored runs by name; in place of a damaged one, its error."""
-    runs: list[tuple[str, RunDirectory | EvoexpError]] = []
+    runs: dict[str, RunDirectory | EvoexpError] = {}
     for name in run_names(outputs):
         try:
-            runs.append((name, open_run(outputs, name)))
+            runs[name] = open_run(outputs, name)
         except EvoexpError as error:
-            runs.append((name, error))
-    return runs
+            runs[name] = error
+    return list(runs.items())
 
 
 def stored_run(prefix: str) -> RunDirectory:

@@ -17,10 +17,7 @@ from evoexp.store.summaries import altered
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
 MANY = 200  # logs, likewise: their solutions are evaluated
-PART = 64  # logs per task of a worker
 SHOWN = 4  # problems of a run
-
-
 RUN_KEYS = [name for name in RunCheck._fields if name != "run"]
 
 
@@ -64,32 +61,26 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
     """Yield the checks of every run's logs; those of large stores come from worker processes."""
-    paths = [
-        [run.run.log_path(k) for k in sorted(run.run.completed())] if run.run else []
-        for run in runs
+    stored = [sorted(check.run.completed()) if check.run else [] for check in runs]
+    tasks = [
+        (check.run.log_path(k), check.run.condition_id)
+        for check, replicates in zip(runs, stored, strict=True)
+        if check.run
+        for k in replicates
     ]
-    parts = [
-        (own[start : start + PART], run.run.condition_id)
-        for run, own in zip(runs, paths, strict=True)
-        if run.run
-        for start in range(0, len(own), PART)
-    ]
-    size = sum(path.lstat().st_size for own in paths for path in own)
-    is_small = (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2
     with contextlib.ExitStack() as stack:
-        checks: Iterable[list[LogCheck]] = itertools.starmap(_check, parts)
-        if not is_small:
-            workers = stack.enter_context(Workers(min(num_cores(), len(parts))))
-            checks = in_order(workers, _check, parts)
-        flat = itertools.chain.from_iterable(checks)
-        for own in paths:
-            yield list(itertools.islice(flat, len(own)))
+        checks: Iterable[LogCheck] = itertools.starmap(_check, tasks)
+        if len(tasks) >= MANY or sum(path.lstat().st_size for path, _ in tasks) >= LARGE:
+            workers = stack.enter_context(Workers(min(num_cores(), len(tasks))))
+            checks = iter(in_order(workers, _check, tasks))
+        for replicates in stored:
+            yield list(itertools.islice(checks, len(replicates)))
 
 
-def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:
+def _check(path: Path, condition_id: str) -> LogCheck:
     from evoexp.batch.reproduction import contradictions  # planners, which take long to load
 
-    return [check_log(path, condition_id, contradictions) for path in paths]
+    return check_log(path, condition_id, contradictions)
 
 
 def _checked(found: RunCheck, logs: list[LogCheck]) -> RunCheck:

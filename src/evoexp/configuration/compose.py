@@ -26,10 +26,9 @@ from omegaconf.errors import OmegaConfBaseException
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.configuration.assignment import assigned
-from evoexp.configuration.building import build_settings, planned_replicates
-from evoexp.configuration.conditions import Builder, Composed, Entry, concerning
+from evoexp.configuration.building import build_settings, fill_in, planned_replicates
+from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
-from evoexp.configuration.interpolations import fill_in
 from evoexp.configuration.overrides import (
     ADD,
     DELETE,
@@ -45,7 +44,6 @@ from evoexp.configuration.overrides import (
     single_values,
     sweep,
 )
-from evoexp.configuration.problem_folders import FOLDER
 from evoexp.configuration.refusals import check_file, uncomposed, unparsed, without_header
 from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, is_file
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
@@ -54,9 +52,9 @@ from evoexp.shipped import Option
 
 _PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
-# how Hydra would run a job, which takes a fifth of the time to compose
 # parts of an entry of `conditions`, with what each is where it is left out
 PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
+# how Hydra would run a job, which takes a fifth of the time to compose
 _JOB = ("launcher", "sweeper", "output", "help", "hydra_help", "hydra_logging", "job_logging")
 _NO_JOB = [f"~hydra/{group}" for group in _JOB]
 _COMPOSER = (HydraException, OmegaConfBaseException, yaml.YAMLError, ValueError, TypeError, OSError)

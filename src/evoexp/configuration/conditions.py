@@ -2,29 +2,37 @@
 
 An override of the command line wins over an entry. It concerns the conditions that have such a
 setting; one that concerns none is refused.
+
+A folder of problems as MoveIt writes them, `scenario.folder=…`, gives a condition per problem: a
+`scene0001.yaml` beside a `request0001.yaml`, or folders of these, as MotionBenchMaker has them.
 """
 
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from evoexp.attachments import located
 from evoexp.configuration.assignment import assigned, known_instead
-from evoexp.configuration.building import condition_of
+from evoexp.configuration.building import MARK, condition_of
 from evoexp.configuration.experiment import Budget, Built
-from evoexp.configuration.interpolations import MARK
 from evoexp.configuration.labels import Crossed, labels_of, refuse_equal_labels, rejoined
 from evoexp.configuration.overrides import (
     NOT_IDENTITY,
     PLANNER_PARTS,
     Choice,
+    Override,
+    Value,
     single_values,
     sweep,
     sweep_texts,
 )
-from evoexp.configuration.problem_folders import problem_choices
 from evoexp.configuration.refusals import chosen
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.shipped import Option
+
+FOLDER, SCENE, REQUEST = "scenario.folder", "scenario.scene", "scenario.request"
+MOST_PROBLEMS = 10_000  # conditions of one call
 
 Entry = tuple[str, Choice]  # label and overrides, each with one value, of an experiment's file
 
@@ -105,7 +113,7 @@ class Builder:
                     continue
                 seen.add(words)
                 swept = sweep_texts(overrides, typed)
-                for problem, choice in problem_choices({**own, **typed}):
+                for problem, choice in _problem_choices({**own, **typed}):
                     yield Crossed(self.name, label, swept, problem, own, typed, choice)
 
     def _concerning(self, choice: Choice, own: Choice) -> Choice:
@@ -133,3 +141,35 @@ class Builder:
 def concerning(choice: Choice, config: dict[str, Any]) -> Choice:
     """Return the overrides that chosen options have a setting for, and those of groups."""
     return {key: each for key, each in choice.items() if known_instead(config, each) is None}
+
+
+def _problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
+    """Yield label and overrides of every problem of a folder; without one, the overrides as given.
+
+    A label is the folder's name and the number, `box_panda 0001`; problems come in the order of the
+    paths of their scenes.
+    """
+    if FOLDER not in choice:
+        yield "", choice
+        return
+    for key in (SCENE, REQUEST):
+        if key in choice:
+            raise SettingError(key, f"left out beside {FOLDER}", choice[key].text)
+    folder = "".join(str(value.data) for value in choice[FOLDER].values)
+    root = Path(located(folder))
+    if "\0" in folder or not root.is_dir():
+        raise SettingError(FOLDER, "a folder of problems", folder)
+    scenes = sorted([*root.glob("scene*.yaml"), *root.glob("*/scene*.yaml")])
+    if not scenes or len(scenes) > MOST_PROBLEMS:
+        must = f"a folder of 1 to {MOST_PROBLEMS:,} problems (scene0001.yaml, request0001.yaml, …)"
+        raise SettingError(FOLDER, must, f"{folder} with {len(scenes) or 'none'}")
+    rest = {key: override for key, override in choice.items() if key != FOLDER}
+    for scene in scenes:
+        number = scene.stem.removeprefix("scene")
+        request = scene.with_name(f"request{number}.yaml")
+        if not request.is_file():
+            raise SettingError(FOLDER, f"a folder with {request.name} beside every scene", folder)
+        files = {}
+        for key, path in ((SCENE, str(scene)), (REQUEST, str(request))):
+            files[key] = Override("", key, (Value(path, path),), False, f"{key}={path}")
+        yield f"{scene.resolve().parent.name} {number}".strip(), rest | files

@@ -17,11 +17,10 @@ A check that fails raises `ContractBroken`, whose message says what a planner or
 operator must do, and what this one did.
 """
 
-import evoexp.testing.contract
-import evoexp.testing.solution_checks  # noqa: F401  # each adds its checks
+import evoexp.testing.solution_checks  # noqa: F401  # adds its checks
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.testing.evolution_record import CHECKS, Check, ContractBroken
+from evoexp.testing.contract import CHECKS, Check, ContractBroken
 from evoexp.testing.operator_checks import check_operator, crossed, mutated, selected
 
 __all__ = [

@@ -4,24 +4,97 @@ Every check takes a condition, runs its replicate 0 (once for all checks) and ra
 `ContractBroken` where the planner does something else.
 """
 
+import functools
 import inspect
 import itertools
-import math
 import pickle
-from collections.abc import Iterator
-from typing import get_args
+import random
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
+from numpy import random as numpy_random
+from numpy.typing import NDArray
 
+from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.planners.planner import MEMBERS, Reproducibility
-from evoexp.store.log_reader import read_log
-from evoexp.testing.evolution_record import Demand, evolution, finished, obligation
+from evoexp.records import FloatArray, Generation, generations
+from evoexp.store.log import Finished
 from evoexp.validation import Component
 
 # terms of planners whose best is more than one individual: a team, or a whole plan
 BETTER_THAN_ALONE = {"team_cost", "sub_path", "phase"}
 STARTS_ANEW = "attempts"  # a term of planners that begin again where an attempt has failed
+Check = Callable[[Condition], None]
+Demand = tuple[object, str, object]  # whether an obligation is kept, what it is, what was instead
+
+CHECKS: list[Check] = []
+
+
+class ContractBroken(AssertionError):
+    """A planner or an operator that does not keep one of its obligations."""
+
+
+class EvolutionRecord(NamedTuple):
+    """Replicate 0 of a condition."""
+
+    planner: Any  # the planner
+    problem: Any  # its problem
+    # the initial one first; their arrays are copies made before the next one was asked for
+    generations: list[Generation]
+    bests: list[FloatArray]  # the very arrays of the best solutions, which must keep their values
+    last_population: NDArray[Any]  # the last population itself, after the planner has ended
+    has_drawn: bool  # whether the planner drew from its generator
+    global_randomness: bool  # whether numpy's and Python's global generators were used
+
+    @property
+    def last(self) -> Generation:
+        """The last record."""
+        return self.generations[-1]
+
+
+@functools.lru_cache(maxsize=8)
+def evolution(condition: Condition) -> EvolutionRecord:
+    """Run replicate 0 of a condition and keep everything that the planner showed."""
+    before, rng = _global_states(), condition.rng(0)
+    untouched = rng.bit_generator.state
+    planner, problem = condition.prepare()
+    records, bests, population = list[Generation](), list[FloatArray](), np.empty(0)
+    for each in generations(planner.evolve(problem, rng)):
+        population = each.population
+        bests.append(each.best)
+        best, costs, copied = each.best.copy(), each.costs.copy(), population.copy()
+        records.append(each._replace(best=best, costs=costs, population=copied))
+    if not records:
+        raise ContractBroken("evolve must yield the initial population at least; was nothing")
+    has_drawn, used = rng.bit_generator.state != untouched, before != _global_states()
+    return EvolutionRecord(planner, problem, records, bests, population, has_drawn, used)
+
+
+@functools.lru_cache(maxsize=16)
+def finished(condition: Condition, replicate: int) -> Finished:
+    """Return the log and the summary of a replicate."""
+    return run_replicate(condition, replicate)
+
+
+def obligation(demands: Callable[[Condition], Iterator[Demand]]) -> Check:
+    """Make a check of what a function demands of a condition's planner."""
+
+    @functools.wraps(demands)
+    def check(condition: Condition) -> None:
+        for is_kept, must, was in demands(condition):
+            if not is_kept:
+                name = getattr(condition.planner, "component", type(condition.planner).__name__)
+                raise ContractBroken(f"planner '{name}': {must}; was {was}")
+
+    CHECKS.append(check)
+    return check
+
+
+def _global_states() -> tuple[Any, ...]:
+    state: Any = numpy_random.get_state(legacy=False)  # noqa: NPY002  # its use is looked for
+    return repr(state), state["state"]["key"].tobytes(), random.getstate()
 
 
 # its members, its identity, its randomness
@@ -33,9 +106,6 @@ def every_member_is_there(condition: Condition) -> Iterator[Demand]:
     planner = condition.planner
     must = "a planner must be a Component, so that a configuration can name it"
     yield isinstance(planner, Component), must, type(planner).__name__
-    missing = [name for name in MEMBERS if not hasattr(planner, name)]
-    must = "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
-    yield not missing, f"{must}gives the usual answers)", f"without {', '.join(missing)}"
     for name, wanted in MEMBERS.items():
         if not inspect.isfunction(wanted):
             continue
@@ -195,22 +265,3 @@ def numbers_are_finite(condition: Condition) -> Iterator[Demand]:
         yield type(solved) is bool, f"solved must be true or false{where}", repr(solved)
         wrong = {k: v for k, v in terms.items() if not isinstance(v, int | float)}
         yield not wrong, f"terms must be numbers by name{where}", wrong
-
-
-@obligation
-def the_summary_says_what_the_log_says(condition: Condition) -> Iterator[Demand]:
-    """The summary of a replicate has the numbers of its last generation."""
-    log = read_log(finished(condition, 0).content)
-    last, summary = log.generations[-1], log.summary
-    for name in ("best_cost", "evaluations", "collision_queries", "solved"):
-        was, wanted = getattr(summary, name), getattr(last, name)
-        must = f"{name} of the summary must be that of the last generation, {wanted}"
-        yield was == wanted, must, was
-    found = evolution(condition)  # which no cap on collision queries ends
-    evaluated = found.planner.evaluate(found.problem, np.array(log.solutions[-1].values))
-    must = "terms of the summary must be those that are recorded and those of evaluate"
-    given, wanted = (sorted(terms.items()) for terms in (summary.terms, last.terms | evaluated))
-    yield repr(given) == repr(wanted), must, summary.terms  # NaN equals NaN
-    must = f"the last logged solution must have the best cost, {last.best_cost}"
-    same = log.solutions[-1].cost == last.best_cost or math.isnan(last.best_cost)
-    yield same, must, log.solutions[-1].cost

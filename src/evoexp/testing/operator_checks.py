@@ -11,7 +11,7 @@ from evoexp.evolution.operators.operator import (
     Selection,
 )
 from evoexp.records import FloatArray, IntArray
-from evoexp.testing.evolution_record import ContractBroken
+from evoexp.testing.contract import ContractBroken
 
 NUM_GENES, SIZE, SPARE = 6, 9, 4  # of a small population; SPARE columns pad the offspring
 NOTHING = np.empty((0, 2))

@@ -13,7 +13,7 @@ from evoexp.errors import EvoexpError, SettingError
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import num_values
 from evoexp.robots.assembly import Robot
-from evoexp.testing.evolution_record import Demand, evolution, obligation
+from evoexp.testing.contract import Demand, evolution, obligation
 
 TOLERANCE = 1e-9  # [-] of numbers that pass through another unit on their way
 NUM_SAMPLES = 6  # [-] individuals that are drawn and judged

@@ -12,9 +12,7 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.claims import SizeComparison
 from evoexp.papers.corsepius.figures import (
     population_effort,
-    posture_history,
     posture_motions,
-    posture_trap,
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
@@ -43,7 +41,7 @@ def test_a_way_through_subgoals_has_phases_and_is_no_manoeuvre(outputs: Path) ->
         page_of(two, page_settings("corsepius_wall", "corsepius_sweep")),
     )
     stems, swept = ({drawing.stem for drawing in found.drawings} for found in pages)
-    assert "phases" in stems and "values" in swept
+    assert "Phases" in {table.heading for table in pages[0].tables} and "values" in swept
     assert not any(stem.startswith("manoeuvre") for stem in stems)
 
 
@@ -98,12 +96,12 @@ def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
 
 def test_histories_keep_the_last_value_of_searches_that_ended(outputs: Path) -> None:
     results = solved(outputs, "corsepius_ball")
-    table = posture_history.history_table(results)
+    table = population_effort.history_table(results)
     assert (table["begun"] == FEW).all()
     assert table.groupby("quantity")["running"].max().tolist() == [FEW, FEW]
-    last = table[table["quantity"] == posture_history.DISTANCE].sort_values("cycle").iloc[-1]
+    last = table[table["quantity"] == population_effort.DISTANCE].sort_values("cycle").iloc[-1]
     assert last["median"] == pytest.approx(np.median(measures.residuals(results.conditions[0])))
-    assert can_be_drawn(table, posture_history.draw_history)
+    assert can_be_drawn(table, population_effort.draw_history)
 
 
 @pytest.mark.matrix
@@ -123,14 +121,16 @@ def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
 
 @pytest.mark.matrix
 def test_the_trap_shows_both_kinds_of_runs(outputs: Path) -> None:
-    pair = posture_trap.stuck_pair(solved(outputs, "corsepius_wall").main)
+    pair = posture_motions.stuck_pair(solved(outputs, "corsepius_wall").main)
     assert [c.label for c in pair] == ["wall", "with a sub-goal"]
-    table = posture_trap.trap_table(*pair)
-    tools = table[table["element"] == posture_trap.TOOL].sort_values("order")
+    table = posture_motions.trap_table(*pair)
+    tools = table[table["element"] == posture_motions.TOOL].sort_values("order")
     ends = tools.groupby(["series", "replicate"])["value"].last()
     assert (ends["stuck"] > 0.1).all() and (ends["helped"] < 0.01).all()
-    assert list(table[table["element"] == posture_trap.ESCAPE]["x"]) == list(posture_trap.BOXES)
-    assert can_be_drawn(table, posture_trap.draw_trap)
+    assert list(table[table["element"] == posture_motions.ESCAPE]["x"]) == list(
+        posture_motions.BOXES
+    )
+    assert can_be_drawn(table, posture_motions.draw_trap)
 
 
 def test_expected_effort_counts_failures(outputs: Path) -> None:

@@ -10,7 +10,8 @@ from matplotlib.patches import Arc, Circle
 
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers import trails
-from evoexp.papers.rana import motions
+from evoexp.papers.rana import measures
+from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.results import motion_geometry
@@ -26,7 +27,7 @@ NUMBERED = 5  # every fifth via-point carries its number
 
 def arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and joint angles at start and goal."""
-    problem = motions.problem(condition)
+    problem = condition.problem(Problem)
     rows = []
     for posture, q in (("start", problem.start), ("goal", problem.goal)):
         for arm, joint, start, end in motion_geometry.joint_positions(problem.assembly, q[:, None]):
@@ -117,8 +118,8 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
 
 def circles_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and circles of the best replicate at its via-point of least centre distance."""
-    problem = motions.problem(condition)
-    q = motions.best_motion(condition)
+    problem = condition.problem(Problem)
+    q = measures.best_motion(condition)
     instant = int(np.argmin(problem.centre_distances(q)))
     at = q[:, instant]
     rows: list[tuple[object, ...]] = [
@@ -177,7 +178,7 @@ def draw_circles(table: pd.DataFrame) -> Figure:
 def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
     frames = []
-    shape = condition.planner.shape(motions.problem(condition))
+    shape = condition.planner.shape(condition.problem(Problem))
     parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shape])[:-1])
     for arm, (values, (rows, joints)) in enumerate(zip(parts, shape, strict=True)):
         angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")

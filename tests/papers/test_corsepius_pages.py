@@ -49,7 +49,7 @@ def test_conditions_of_one_task_are_told_by_all_but_the_setting(outputs: Path) -
     found = measures.tasks(smoke_results(outputs, "corsepius_population"), "num_offspring")
     names = "ball, pose, bottle, shelf, wide gate, narrow gate, wall, pick and place"
     assert ", ".join(task.name for task in found) == names
-    assert all(task.values == (10, 25, 50, 100, 200, 400, 800) for task in found)
+    assert all(list(task.by_value) == [10, 25, 50, 100, 200, 400, 800] for task in found)
     assert found[0].by_value[100.0].label == "ball, λ = 100"
 
 
@@ -75,7 +75,7 @@ def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
     table = solids.models_table([("MANUS", condition)])
     bodies, covers = (table[table["element"] == kind] for kind in (solids.BODY, solids.COVER))
-    problem = measures.problem(condition)
+    problem = condition.prepared.problem
     assert list(bodies["name"]) == list(problem.bodies.names)
     assert len(covers) == problem.bodies.num_shapes
     inner, outer = solids.corners(bodies), solids.corners(covers)
@@ -151,9 +151,9 @@ def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
     assert [task.name for task in found] == ["surface", "point", "snake at a point"]
     table = population_effort.floor_table(found).set_index(["quantity", "task"])
     for task in found:
-        assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
+        assert list(task.by_value) == [0.0125, 0.025, 0.05, 0.1, 0.2, 0.4]
         medians = table.loc[(population_effort.RESIDUAL, task.name), "median"].astype(float)
-        expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
+        expected = np.polyfit(np.log(list(task.by_value)), np.log(medians), 1)[0]
         assert population_effort.slope(task) == pytest.approx(expected)
     assert can_be_drawn(table.reset_index(), population_effort.draw_floor)
 
@@ -162,7 +162,8 @@ def test_a_series_without_points_is_not_in_the_legend() -> None:
     shown = SizeComparison("ball", 200.0, 0.5, Interval(0.4, 0.6), 1.0)
     empty = SizeComparison("narrow gate", 200.0, 0.0, Interval(0.0, 0.0), 1.0)
     rows = {"cycles": [shown, empty]}
-    table = population_effort.ratios_table(rows, ["ball", "narrow gate"], 100.0)
+    tasks = tuple(measures.Task(name, {}) for name in ("ball", "narrow gate"))
+    table = population_effort.ratios_table(rows, tasks, 100.0)
     figure = population_effort.draw_ratios(table, "λ [-]")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["ball"]
 

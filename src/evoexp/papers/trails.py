@@ -84,11 +84,9 @@ def arm_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
     return [style.key(text, color=colour, linewidth=WIDE) for text, colour in colours.items()]
 
 
-def room(
-    table: pd.DataFrame, names: str = "xy", share: float = 0.08
-) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest place of links, each (names,), and a share of room around."""
-    ends = np.array([table[[name, f"{name}_end"]] for name in names], dtype=np.float64)
+def room(table: pd.DataFrame, share: float = 0.08) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest place of links in the plane, (2,), with room around."""
+    ends = np.array([table[[name, f"{name}_end"]] for name in "xy"], dtype=np.float64)
     low, high = np.nanmin(ends, axis=(1, 2)), np.nanmax(ends, axis=(1, 2))
     pad = share * float((high - low).max())
     return low - pad, high + pad
@@ -107,13 +105,18 @@ def planes(table: pd.DataFrame, count: int, per_line: int = 2) -> tuple[Figure, 
     return figure, panels
 
 
+def space_of_links(figure: Figure, place: tuple[int, int, int], links: pd.DataFrame) -> Any:
+    """Return axes in space that hold some links."""
+    ends = links[["x", "y", "z", "x_end", "y_end", "z_end"]].to_numpy().reshape(-1, 3)
+    return space(figure, place, ends, links["length_unit"].iloc[0])
+
+
 def space(
-    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, **look: Any
+    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, zoom: float = 0.95
 ) -> Any:
     """Return axes in space, with equal scales, that hold some points (points, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    usual: dict[str, Any] = {"view": (22.0, -55.0), "zoom": 0.95, "label_pads": (-7, -7, -7)}
-    look = usual | {"ticks": (2, 4)} | look
-    return surfaces.space(figure, place, low, high, pad, unit, pale=True, **look)
+    look: dict[str, Any] = {"view": (22.0, -55.0), "label_pads": (-7, -7, -7), "ticks": (2, 4)}
+    return surfaces.space(figure, place, low, high, pad, unit, pale=True, zoom=zoom, **look)

@@ -47,6 +47,12 @@ def straight_line(condition: ConditionResults) -> FloatArray:
     return motion_geometry.straight_line(condition.planner.shape(found), found.start, found.goal)
 
 
+def sampled(condition: ConditionResults, solution: FloatArray, samples: int) -> FloatArray:
+    """Return a solution's motion, sampled per segment, (nq, instants) [deg]."""
+    q = motion_geometry.configurations(condition.prepared, solution)
+    return motion_geometry.dense(q, samples)[1]
+
+
 def straight_length(condition: ConditionResults) -> float:
     """Return the length of the straight paths of all arms together [deg]."""
     found = condition.problem(Problem)
@@ -255,8 +261,10 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
     ),
     # least distance of centres along the straight line [length unit]
-    "straight_centres": lambda sampled_distances: float(
-        sampled_distances.loc[sampled_distances["series"] == STRAIGHT, "centres"].min()
+    "straight_centres": lambda condition, samples: float(
+        condition.problem(Problem)
+        .centre_distances(sampled(condition, straight_line(condition), samples))
+        .min()
     ),
     # all conditions of each scene in the plane, or in space, and the end of its figure's stem
     "planar_scenes": lambda results: [s for s in _scenes(results) if planar(s[0].with_data[0])],

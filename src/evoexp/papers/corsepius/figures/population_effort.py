@@ -75,15 +75,16 @@ def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
 
 
 def ratios_table(
-    rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float
+    rows: Mapping[str, Sequence[Any]], found: tuple[Task, ...], reference: float
 ) -> pd.DataFrame:
     """Return the effort of every value over that of the recommended one."""
-    found = [
+    names = [task.name for task in found]
+    ratios = [
         (metric, RATIO, names.index(r.task), r.task, r.value, r.ratio, *r.interval, r.bound)
         for metric, own in rows.items()
         for r in own
     ]
-    return pd.DataFrame(found, columns=[*NAMES, "bound"]).assign(reference=reference)
+    return pd.DataFrame(ratios, columns=[*NAMES, "bound"]).assign(reference=reference)
 
 
 def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
@@ -164,7 +165,7 @@ def floor_table(found: Sequence[Task]) -> pd.DataFrame:
                 for value in measures.residuals(c)
             ]
     names = ["position", "task", "quantity", "scope", "median", "lower", "upper", "runs", "slope"]
-    unit = found[0].conditions[0].length_unit
+    unit = next(iter(found[0].by_value.values())).length_unit
     return pd.DataFrame(rows, columns=names).assign(length_unit=unit)
 
 
@@ -173,10 +174,12 @@ def slope(task: Task) -> float:
 
     It is NaN if there are fewer than two scopes.
     """
-    medians = np.array([inference.spread(measures.residuals(c)).median for c in task.conditions])
+    medians = np.array(
+        [inference.spread(measures.residuals(c)).median for c in task.by_value.values()]
+    )
     if len(medians) < 2 or not (medians > 0.0).all():
         return float("nan")
-    x, y = np.log2(np.array(task.values)), np.log2(medians)
+    x, y = np.log2(list(task.by_value)), np.log2(medians)
     x, y = x - x.mean(), y - y.mean()
     return float((x * y).sum() / (x * x).sum())
 

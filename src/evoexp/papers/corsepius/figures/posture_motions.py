@@ -56,7 +56,7 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
     """Return links at every posture, tips, goals, obstacles, objects that are held."""
     panels: list[list[dict[str, Any]]] = []
     for one in shown:
-        problem = measures.problem(one.condition)
+        problem = one.condition.problem(Problem)
         postures = measures.paths(one.condition)[one.replicate]
         spans, unit = problem.spans(postures), one.condition.length_unit
         for number, span in enumerate(spans) if one.by_phase else [(0, spans[-1])]:
@@ -158,7 +158,7 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
 def scope_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the shown path in its two liveliest joints, and hulls of the tool's first steps."""
     replicate = measures.shown_replicate(condition)
-    problem, q = measures.problem(condition), measures.paths(condition)[replicate]
+    problem, q = condition.problem(Problem), measures.paths(condition)[replicate]
     moved = np.abs(np.diff(q, axis=0)).sum(axis=0)
     a, b = sorted(int(k) for k in np.argsort(-moved, kind="stable")[:2])
     half = problem.scope[[a, b]] / DEGREE
@@ -218,7 +218,7 @@ def stuck_pair(obstructed: Conditions) -> Conditions:
     """Return a task of one phase in which runs get stuck, and with sub-goals, solved; or none."""
     pairs = (
         (stuck, helped)
-        for stuck, helped in measures.subgoal_pairs(obstructed)
+        for stuck, helped in measures.pairs_but_for("subgoals", obstructed)
         if stuck.solved < stuck.done and helped.solved > 0 and len(stuck.scenario.phases) == 1
     )
     return next(pairs, ())

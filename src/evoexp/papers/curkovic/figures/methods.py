@@ -214,39 +214,28 @@ def facet_table(results: Results, threshold: float) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
 
 
-def draw_convergence(table: pd.DataFrame) -> Figure:
-    """Draw medians of the best cost so far, and the threshold."""
-    finite = table.assign(median=table["median"].replace([np.inf], np.nan))
-    return _draw(finite, "median", {}, "{name}", "best cost so far (median)")
-
-
-def draw_effort(table: pd.DataFrame) -> Figure:
-    """Draw the share of all runs that have reached the cost, as steps."""
-    steps = {"drawstyle": "steps-post"}
-    return _draw(table, "reached", steps, "{name} ({reaching} of {runs})", "share of runs")
-
-
-def _draw(
-    table: pd.DataFrame, column: str, look: dict[str, Any], label: str, quantity: str
-) -> Figure:
-    """Draw a line per condition, named by a label that its columns fill in, panel by panel."""
+def draw_facets(table: pd.DataFrame, column: str) -> Figure:
+    """Draw a line per condition: medians of the best cost so far, or the share that got there."""
     names = int(table.groupby("panel")["name"].nunique().max())
     figure, panels = style.panels(2.4 + 0.09 * names, table["panel"].nunique(), 2)
-    for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
+    is_share = column == "reached"
+    look: dict[str, Any] = {"drawstyle": "steps-post"} if is_share else {}
+    for axes, (_, rows) in zip(panels, groups(table.replace(np.inf, np.nan), "panel"), strict=True):
         axes.sharex(panels[0])
         axes.sharey(panels[0])
         several = rows.groupby("generation")["evaluations"].nunique().max() > 1
         across = "evaluations" if several else "generation"
         for position, own in groups(rows, "position"):
-            colour, name = style.condition_colour(int(position)), label.format_map(own.iloc[0])
+            name, reaching, runs = own[["name", "reaching", "runs"]].iloc[0]
+            name += f" ({reaching} of {runs})" * is_share
+            colour = style.condition_colour(int(position))
             axes.plot(own[across], own[column], color=colour, label=name, **look)
-        if column == "median":
-            line: dict[str, Any] = {"color": style.NEUTRAL, "lw": 1.0, "ls": (0, (4, 2))}
-            axes.axhline(float(rows["threshold"].iloc[0]), label="threshold", **line)
+        if is_share:
+            axes.set(ylim=(-0.02, 1.02), ylabel="share of runs")
         else:
-            axes.set_ylim(-0.02, 1.02)
-        limits = (0, float(rows[across].max()))
-        axes.set(xlabel=across, xlim=limits, ylabel=quantity, title=rows["title"].iloc[0])
+            axes.set_ylabel("best cost so far (median)")
+            axes.axhline(rows["threshold"].iloc[0], label="threshold", **LINES[THRESHOLD])
+        axes.set(xlabel=across, xlim=(0, rows[across].max()), title=rows["title"].iloc[0])
         axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.2), ncols=2, fontsize=6.5)
     return figure
 

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
 from evoexp.papers.rana import measures
 from evoexp.papers.rana.figures.planar_models import path_table
-from evoexp.papers.rana.measures import BETWEEN_ARMS, STRAIGHT, TO_OBSTACLES
+from evoexp.papers.rana.measures import STRAIGHT, TO_OBSTACLES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style
@@ -36,10 +37,6 @@ LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are draw
     AT_VIA_POINTS: {"color": style.ARM_COLOURS[0], "ls": "none", "marker": "o", **style.DOTS},
     CLOSEST: {"color": style.NEUTRAL, "ls": "none", "marker": "D", "ms": 2.2, "alpha": 0.6},
     REFUTED: {"color": style.FORBIDDEN, "ls": "none", "marker": "X", "ms": 5, "mec": "white"},
-}
-COLUMNS = {  # of `sampled_distances`, by kind of pairs and measure
-    BETWEEN_ARMS: {CENTRES: "centres", LINKS: "links"},
-    TO_OBSTACLES: {CENTRES: "centres_to_obstacles", LINKS: "links_to_obstacles"},
 }
 Measure = motion_geometry.Measure
 TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
@@ -68,16 +65,15 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
 def draw_snapshots(table: pd.DataFrame) -> Figure:
     """Draw the motion stage by stage, older instants fainter, and all of it in the last panel."""
     obstacles, moving = table[table["stage"] < 0], table[table["stage"] >= 0]
-    stages, unit = list(groups(moving, "stage")), table["length_unit"].iloc[0]
+    stages = list(groups(moving, "stage"))
     names = "xyz" if "z" in table else "xy"
     if names == "xy":
         figure, panels = trails.planes(table, len(stages), 3)
     else:
         lines = -(-len(stages) // 3)
         figure = style.figure(2.1 * lines + 0.4)
-        ends = moving[[f"{name}{end}" for end in ("", "_end") for name in names]].to_numpy()
-        points, places = ends.reshape(-1, 3), range(1, len(stages) + 1)
-        panels = [trails.space(figure, (lines, 3, k), points, unit) for k in places]
+        places = ((lines, 3, k + 1) for k in range(len(stages)))
+        panels = [trails.space_of_links(figure, place, moving) for place in places]
     for axes, (stage, rows) in zip(panels, stages, strict=True):
         for _, outline in groups(obstacles, "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
@@ -164,86 +160,61 @@ def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = Fals
     return figure
 
 
-def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
+def distances_table(condition: ConditionResults, samples: int) -> pd.DataFrame:
     """Return least distances along the best motion and the straight line, their range over all."""
-    quantities = _measures(condition)
-
-    def sampled(solution: FloatArray) -> FloatArray:
-        q = motion_geometry.configurations(condition.prepared, solution)
-        return motion_geometry.dense(q, samples)[1]
-
-    # series → the configurations (nq, instants) [deg] at which each quantity is measured
-    series = {
-        STRAIGHT: [sampled(measures.straight_line(condition))] * len(quantities),
-        BEST: [sampled(condition.solutions[condition.best_replicate])] * len(quantities),
-    }
-    ranges = motion_geometry.extremes(
-        list(condition.solutions),
-        lambda replicate: sampled(condition.solutions[replicate]),
-        [quickly for _, quickly in quantities.values()],
-    )
-    series[LOWEST] = [found.at_lowest for found in ranges]
-    series[HIGHEST] = [found.at_highest for found in ranges]
-    parts = []
-    for name, places in series.items():
-        columns: dict[str, Any] = {
-            "series": name,
-            "instant": np.arange(places[0].shape[1]) / samples,
-        }
-        for q, (column, (exactly, _)) in zip(places, quantities.items(), strict=True):
-            columns[column] = exactly(q)
-        parts.append(pd.DataFrame(columns))
-    return rounded(pd.concat(parts, ignore_index=True))
-
-
-def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]:
-    """Return column → its exact measure, and one as good and quick, of q (nq, instants) [deg]."""
-    problem, kinds = condition.problem(Problem), measures.kinds_of_pairs(condition)
-    scene, by_coal = problem.scene, {BETWEEN_ARMS: motion_geometry.link_distance(problem.assembly)}
-    if TO_OBSTACLES in kinds:
-        geometry = scene.geometry.copy()
-        geometry.removeAllCollisionPairs()
-        for one, two in scene.pairs[kinds[TO_OBSTACLES][0]]:
-            geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
-        by_coal[TO_OBSTACLES] = motion_geometry.BodyDistance(scene.model, geometry)
-    found = dict[str, tuple[Measure, Measure]]()
-    for kind, bodies in by_coal.items():
-        own = problem.centre_distances if kind == BETWEEN_ARMS else problem.obstacle_distances
-        quick = motion_geometry.distance_measure(scene.of_pairs(kinds[kind][0]), bodies)
-        found[COLUMNS[kind][CENTRES]] = (own, own)
-        found[COLUMNS[kind][LINKS]] = (_in_radians(bodies), _in_radians(quick))
-    return found
-
-
-def _in_radians(measure: Measure) -> Measure:
-    return lambda q: measure(DEGREE * q)
-
-
-def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
-    """Return the distances that Fig. 7 shows."""
-    found = {name: rows.set_index("instant") for name, rows in groups(sampled, "series")}
-    best = found[BEST]
-    found[AT_VIA_POINTS] = best[best.index == best.index.to_numpy().round()]
-    drawn = (BEST, AT_VIA_POINTS, LOWEST, HIGHEST, STRAIGHT)
-    exact, parts = measures.approaches(condition), []
-    for kind, (_, margin) in measures.kinds_of_pairs(condition).items():
+    solutions, exact, parts = condition.solutions, measures.approaches(condition), []
+    sampled = partial(measures.sampled, condition, samples=samples)
+    for kind, (pairs, margin) in measures.kinds_of_pairs(condition).items():
         own = exact[exact["kind"] == kind]
-        for measure, column in COLUMNS[kind].items():
-            series = {name: found[name][column] for name in drawn}
+        for measure, (exactly, quickly) in _measures(condition, kind, pairs).items():
+            (ranges,) = motion_geometry.extremes(
+                list(solutions), lambda replicate: sampled(solutions[replicate]), [quickly]
+            )
+            places = {
+                BEST: sampled(solutions[condition.best_replicate]),
+                LOWEST: ranges.at_lowest,
+                HIGHEST: ranges.at_highest,
+                STRAIGHT: sampled(measures.straight_line(condition)),
+            }
+            # series → its instants, and the distance at each
+            series = {
+                name: (np.arange(q.shape[1]) / samples, exactly(q)) for name, q in places.items()
+            }
+            at = tuple(values[::samples] for values in series[BEST])
+            series = {BEST: series[BEST], AT_VIA_POINTS: at, **series}
             if measure == LINKS:
-                free = own[own["refuted_at"].isna()].set_index("clearance_at")["clearance"]
-                touching = own[own["refuted_at"].notna()].set_index("refuted_at")["clearance"]
-                series |= {CLOSEST: free, REFUTED: touching}
-            for name, values in series.items():
-                columns: dict[str, Any] = {
-                    "measure": measure,
-                    "series": name,
-                    "instant": values.index,
-                }
-                rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
-                parts.append(rows.assign(kind=kind, safety_distance=margin))
+                for name, at_name in ((CLOSEST, "clearance_at"), (REFUTED, "refuted_at")):
+                    rows = own[own["refuted_at"].notna() == (name == REFUTED)]
+                    series[name] = rows[at_name].to_numpy(), rows["clearance"].to_numpy()
+            for name, (instants, distances) in series.items():
+                columns: dict[str, Any] = {"measure": measure, "series": name}
+                columns |= {"instant": instants, "distance": distances}
+                parts.append(pd.DataFrame(columns).assign(kind=kind, safety_distance=margin))
     table = rounded(pd.concat(parts, ignore_index=True))
     return table.assign(length_unit=condition.length_unit)
+
+
+def _measures(
+    condition: ConditionResults, kind: str, pairs: np.ndarray
+) -> dict[str, tuple[Measure, Measure]]:
+    """Return measure → the exact one, and one as good and quick, of q (nq, instants) [deg]."""
+    problem = condition.problem(Problem)
+    scene, bodies = problem.scene, motion_geometry.link_distance(problem.assembly)
+    centres = problem.centre_distances
+    if kind == TO_OBSTACLES:
+        geometry = scene.geometry.copy()
+        geometry.removeAllCollisionPairs()
+        for one, two in scene.pairs[pairs]:
+            geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
+        bodies = motion_geometry.BodyDistance(scene.model, geometry)
+        centres = problem.obstacle_distances
+    quick = motion_geometry.distance_measure(scene.of_pairs(pairs), bodies)
+    links = partial(_in_radians, bodies), partial(_in_radians, quick)
+    return {CENTRES: (centres, centres), LINKS: links}
+
+
+def _in_radians(measure: Measure, q: FloatArray) -> FloatArray:
+    return measure(DEGREE * q)
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:

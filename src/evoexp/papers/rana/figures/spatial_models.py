@@ -45,7 +45,7 @@ def draw_arm(table: pd.DataFrame) -> Figure:
     for k, title in enumerate(
         ("a  touching spheres of the collision model", "b  line segments: the links themselves")
     ):
-        axes = _space(figure, (1, 2, k + 1), table)
+        axes = trails.space_of_links(figure, (1, 2, k + 1), table)
         axes.set_title(title)
         trails.draw_chain(axes, links, colour, "xyz")
         trails.draw_base(axes, links, "xyz")
@@ -62,21 +62,17 @@ def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links at start (instant 0) and goal (1), and each arm's reach from its shoulder on."""
     problem = condition.problem(Problem)
     table = links_table(condition, np.column_stack([problem.start, problem.goal]))
-    lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))
-    links = problem.assembly.links
-    arms = [link.arm for link in links]
-    first = np.array([arms.index(arm) for arm in range(problem.assembly.num_arms)])  # links of arms
-    moving = np.array([link.joint > 0 for link in links])
-    own = moving[table["link"].to_numpy() + first[table["arm"].to_numpy()]]
-    counted = table.assign(reach=np.where(own, lengths, 0.0))
-    reach = counted[counted["instant"] == 0].groupby("arm")["reach"].sum()
+    starts = table[table["instant"] == 0]  # link by link
+    lengths = np.sqrt(sum((starts[f"{axis}_end"] - starts[axis]) ** 2 for axis in "xyz"))
+    moving = np.array([link.joint > 0 for link in problem.assembly.links])
+    reach = lengths[moving].groupby(starts["arm"]).sum()
     return table.assign(reach=table["arm"].map(reach).round(9))
 
 
 def draw_two_arms(table: pd.DataFrame) -> Figure:
     """Draw the arms at start and goal, and from above the part of the workspace they share."""
     figure = style.figure(4.3)
-    axes = _space(figure, (1, 2, 1), table)
+    axes = trails.space_of_links(figure, (1, 2, 1), table)
     axes.set_title("a  start (full) and goal (dashed)")
     above = figure.add_subplot(1, 2, 2)
     above.set_title("b  from above, with each arm's reach")
@@ -101,12 +97,6 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion, stage by stage."""
     links = links_table(condition, measures.best_motion(condition))
     return motion_geometry.in_stages(links, STAGES)
-
-
-def _space(figure: Figure, place: tuple[int, int, int], table: pd.DataFrame) -> Any:
-    """Return axes in space that hold all links of a table."""
-    ends = table[["x", "y", "z", "x_end", "y_end", "z_end"]].to_numpy().reshape(-1, 3)
-    return trails.space(figure, place, ends, table["length_unit"].iloc[0])
 
 
 def _name_points(axes: Any, arm: int, links: pd.DataFrame) -> None:

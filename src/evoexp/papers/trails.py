@@ -5,6 +5,7 @@ are the axes that are drawn: "xy" or "xyz".
 """
 
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from matplotlib.lines import Line2D
 
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, style, surfaces
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.scenarios.obstacles import obstacle_table
 
 DASHES: Any = (0, (2, 1))
 DASHED: dict[str, Any] = {"linestyle": DASHES}
@@ -65,6 +69,14 @@ def draw_base(axes: Any, links: pd.DataFrame, names: str = "xy") -> None:
     """Draw the square of an arm's base."""
     square: dict[str, Any] = {"color": style.NEUTRAL, "markersize": 6, "zorder": 3}
     axes.plot(*(links[name].iloc[:1] for name in names), "s", **square)
+
+
+def obstacle_edges(condition: ConditionResults, reach: float = 1.0) -> list[tuple[float, ...]]:
+    """Return the edges of the outlines of a scene's obstacles: number, x, y, x_end, y_end."""
+    outlines = motion_geometry.obstacle_outlines(
+        obstacle_table(condition.scenario.obstacles), reach
+    )
+    return [(k, *a, *b) for k, outline in enumerate(outlines) for a, b in pairwise(outline)]
 
 
 def trail_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:

@@ -275,9 +275,7 @@ def same_problems(groups: tuple[Group, ...]) -> Iterator[tuple[object, ...]]:
             yield one, two, ratios, len(own & other), nodes, 100.0 * exchanged
 
 
-def route_panels(
-    groups: tuple[Group, ...], route_list: Routes
-) -> list[tuple[str, ConditionResults, list[Line]]]:
+def route_panels(groups: tuple[Group, ...], route_list: Routes) -> list[Panel]:
     """Return one path per route of every weighting."""
     panels = []
     for group in groups:
@@ -340,17 +338,16 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         (
             g.title,
             g.main,
-            [
-                *(Line(FAINT, path) for path in paths(g.main).values()),
-                *known_lines(g),
-            ],
+            [*(Line(FAINT, each) for each in paths(g.main).values()), *known_lines(g)],
         )
         for g in groups
     ],
     # the first condition of each weighting against its others
     "group_families": lambda groups: [Family.of(group.conditions) for group in groups],
     # of all weightings, references included
-    "shown_conditions": lambda groups: tuple(c for group in groups for c in group.all),
+    "shown_conditions": lambda groups: tuple(
+        c for g in groups for c in (*g.conditions, g.truth) if c is not None
+    ),
     "main_conditions": lambda groups: tuple(group.main for group in groups),
     # the run of median cost of every weighting
     "median_runs": lambda main_conditions: [*map(_median_run, main_conditions)],

@@ -10,12 +10,11 @@ from matplotlib.lines import Line2D
 
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.claims import PAIRS
-from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.figures.effects import draw_box
 from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.inference import quantile
+from evoexp.report.statistics.inference import quantile, quantiles
 
 CURVE, FINAL, BOUND, THRESHOLD = "best so far", "final", "lower bound", "threshold"
 COST = "best C₂ + C₃ + C₄ of a team"
@@ -202,12 +201,15 @@ def facet_table(results: Results, threshold: float) -> pd.DataFrame:
     for panel, (title, conditions) in enumerate(facets(results).items()):
         for name, c in conditions.items():
             first = measures.generations_to(c, threshold)
-            rows = c.generations.groupby("index")
-            index = np.unique(c.generations["index"].to_numpy(np.float64))
+            averaged = ["evaluations", "best_cost"]
+            wide = c.generations.pivot(index="index", columns="replicate", values=averaged)
+            (spent,), (best,) = (
+                quantiles(wide[each].to_numpy(np.float64), (0.5,)) for each in averaged
+            )
+            index = wide.index.to_numpy(np.float64)
             columns: dict[str, Any] = {"panel": panel, "title": title}
             columns |= {"position": names.setdefault(name, len(names)), "name": name}
-            columns |= {"generation": index, "evaluations": _medians(rows, "evaluations")}
-            columns |= {"median": _medians(rows, "best_cost")}
+            columns |= {"generation": index, "evaluations": spent, "median": best}
             columns |= {"reached": (first <= index[:, None]).mean(axis=1)}
             columns |= {"reaching": int(np.isfinite(first).sum()), "runs": c.done}
             parts.append(pd.DataFrame(columns))
@@ -238,7 +240,3 @@ def draw_facets(table: pd.DataFrame, column: str) -> Figure:
         axes.set(xlabel=across, xlim=(0, rows[across].max()), title=rows["title"].iloc[0])
         axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.2), ncols=2, fontsize=6.5)
     return figure
-
-
-def _medians(rows: Any, column: str) -> FloatArray:
-    return np.array([quantile(own.to_numpy(np.float64), 0.5) for _, own in rows[column]])

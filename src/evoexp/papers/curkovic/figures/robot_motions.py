@@ -1,6 +1,5 @@
 """Motions of robots in their plane, drawn as trails (Curkovic et al. 2013, Figs. 8, 10 and 11)."""
 
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +16,6 @@ from evoexp.papers.curkovic import measures
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
-from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
 POINTS = 20  # of an end-effector's path, per segment
@@ -33,11 +31,8 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
     The best one is the cheapest that the exact verdict does not refute, if there is one.
     """
     prepared, best = condition.prepared, measures.exemplar(condition)
-    outlines = motion_geometry.obstacle_outlines(obstacle_table(condition.scenario.obstacles))
     edges = [
-        (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
-        for k, outline in enumerate(outlines)
-        for a, b in itertools.pairwise(outline)
+        (OBSTACLE, -1, -1, k, 0.0, *ends, 0.0) for k, *ends in trails.obstacle_edges(condition)
     ]
     # the first contacts of bodies in the motions that the exact verdict refutes
     contacts = []

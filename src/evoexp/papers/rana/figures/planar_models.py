@@ -50,6 +50,7 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     }
     for (posture, arm), links in groups(table, ["posture", "arm"]):
         trails.draw_chain(axes, links, style.arm_colour(arm), **looks[posture])
+        trails.draw_base(axes, links)
     # joint angles with their reference directions, arcs and values
     for row in records(table[table["posture"] == "start"]):
         x, y, colour = row.x, row.y, style.arm_colour(row.arm)
@@ -66,7 +67,6 @@ def draw_arms(table: pd.DataFrame) -> Figure:
         look: dict[str, Any] = {"va": "center", "color": colour, "zorder": 6}
         axes.annotate(text, place, ha="left" if c >= 0 else "right", **look)
         if row.joint == 0:
-            marks.base(axes, x, y, 9, zorder=2)
             marks.write(axes, f"arm {row.arm + 1}", (x, y), (0, -22), color=colour)
     keys = [style.key(name, color=style.NEUTRAL, **look) for name, look in looks.items()]
     style.keys_below(figure, keys)

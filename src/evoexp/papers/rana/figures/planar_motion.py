@@ -1,6 +1,5 @@
 """Motions of planar arms: snapshots, paths in configuration space, distances between the arms."""
 
-import itertools
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -21,7 +20,6 @@ from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
-from evoexp.scenarios.obstacles import obstacle_table
 
 OTHERS = "replicate"
 MOST_PATHS = 200  # replicates whose paths are drawn, beside the best one; more hide each other
@@ -49,14 +47,9 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     links = motion_geometry.links_table(problem.assembly, measures.best_motion(condition))
     table = motion_geometry.in_stages(links.sort_values("instant", kind="stable"), STAGES)
     spans = sum((links[f"{name}_end"] - links[name]).abs() for name in "xyz")
-    obstacles = obstacle_table(condition.scenario.obstacles)
-    outlines = motion_geometry.obstacle_outlines(obstacles, 2.0 * float(np.max(spans)))
+    edges = trails.obstacle_edges(condition, 2.0 * float(np.max(spans)))
     last = int(links["instant"].max())
-    rows = [
-        (-1, 0, last, 0, -1, k, *a, *b)
-        for k, outline in enumerate(outlines)
-        for a, b in itertools.pairwise(outline)
-    ]
+    rows = [(-1, 0, last, 0, -1, *edge) for edge in edges]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     found = pd.concat([table[names], pd.DataFrame(rows, columns=names)]) if rows else table[names]
     return rounded(found.reset_index(drop=True)).assign(length_unit=condition.length_unit)

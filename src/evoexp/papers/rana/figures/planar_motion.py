@@ -173,8 +173,9 @@ def distances_table(condition: ConditionResults, samples: int) -> pd.DataFrame:
             series = {
                 name: (np.arange(q.shape[1]) / samples, exactly(q)) for name, q in places.items()
             }
-            at = tuple(values[::samples] for values in series[BEST])
-            series = {BEST: series[BEST], AT_VIA_POINTS: at, **series}
+            instants, distances = series[BEST]
+            at_via_points = instants[::samples], distances[::samples]
+            series = {BEST: series[BEST], AT_VIA_POINTS: at_via_points, **series}
             if measure == LINKS:
                 for name, at_name in ((CLOSEST, "clearance_at"), (REFUTED, "refuted_at")):
                     rows = own[own["refuted_at"].notna() == (name == REFUTED)]

@@ -20,7 +20,7 @@ SOURCES = sorted(
 )
 OPTIONS = sorted((ROOT / "conf").rglob("*.yaml"))
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
-ROLES = ("planner.py", "kernels.py", "settings.py", "measures.py", "claims.py")
+ROLES = ("planner.py", "kernels.py", "settings.py", "measures.py", "claims.py", "figures.py")
 SOURCE = re.compile(r"# \[[^\]]+\] (paper: \S+|assumed)")
 
 

@@ -12,9 +12,7 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.claims import SizeComparison
 from evoexp.papers.corsepius.figures import (
     population_effort,
-    posture_history,
     posture_motions,
-    posture_trap,
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
@@ -43,7 +41,7 @@ def test_a_way_through_subgoals_has_phases_and_is_no_manoeuvre(outputs: Path) ->
         page_of(two, page_settings("corsepius_wall", "corsepius_sweep")),
     )
     stems, swept = ({drawing.stem for drawing in found.drawings} for found in pages)
-    assert "phases" in stems and "values" in swept
+    assert "Phases" in {table.heading for table in pages[0].tables} and "values" in swept
     assert not any(stem.startswith("manoeuvre") for stem in stems)
 
 
@@ -51,7 +49,7 @@ def test_conditions_of_one_task_are_told_by_all_but_the_setting(outputs: Path) -
     found = measures.tasks(smoke_results(outputs, "corsepius_population"), "num_offspring")
     names = "ball, pose, bottle, shelf, wide gate, narrow gate, wall, pick and place"
     assert ", ".join(task.name for task in found) == names
-    assert all(task.values == (10, 25, 50, 100, 200, 400, 800) for task in found)
+    assert all(list(task.by_value) == [10, 25, 50, 100, 200, 400, 800] for task in found)
     assert found[0].by_value[100.0].label == "ball, λ = 100"
 
 
@@ -77,7 +75,7 @@ def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
     table = solids.models_table([("MANUS", condition)])
     bodies, covers = (table[table["element"] == kind] for kind in (solids.BODY, solids.COVER))
-    problem = measures.problem(condition)
+    problem = condition.prepared.problem
     assert list(bodies["name"]) == list(problem.bodies.names)
     assert len(covers) == problem.bodies.num_shapes
     inner, outer = solids.corners(bodies), solids.corners(covers)
@@ -98,12 +96,12 @@ def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
 
 def test_histories_keep_the_last_value_of_searches_that_ended(outputs: Path) -> None:
     results = solved(outputs, "corsepius_ball")
-    table = posture_history.history_table(results)
+    table = population_effort.history_table(results)
     assert (table["begun"] == FEW).all()
     assert table.groupby("quantity")["running"].max().tolist() == [FEW, FEW]
-    last = table[table["quantity"] == posture_history.DISTANCE].sort_values("cycle").iloc[-1]
+    last = table[table["quantity"] == population_effort.DISTANCE].sort_values("cycle").iloc[-1]
     assert last["median"] == pytest.approx(np.median(measures.residuals(results.conditions[0])))
-    assert can_be_drawn(table, posture_history.draw_history)
+    assert can_be_drawn(table, population_effort.draw_history)
 
 
 @pytest.mark.matrix
@@ -123,14 +121,16 @@ def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
 
 @pytest.mark.matrix
 def test_the_trap_shows_both_kinds_of_runs(outputs: Path) -> None:
-    pair = posture_trap.stuck_pair(solved(outputs, "corsepius_wall").main)
+    pair = posture_motions.stuck_pair(solved(outputs, "corsepius_wall").main)
     assert [c.label for c in pair] == ["wall", "with a sub-goal"]
-    table = posture_trap.trap_table(*pair)
-    tools = table[table["element"] == posture_trap.TOOL].sort_values("order")
+    table = posture_motions.trap_table(*pair)
+    tools = table[table["element"] == posture_motions.TOOL].sort_values("order")
     ends = tools.groupby(["series", "replicate"])["value"].last()
     assert (ends["stuck"] > 0.1).all() and (ends["helped"] < 0.01).all()
-    assert list(table[table["element"] == posture_trap.ESCAPE]["x"]) == list(posture_trap.BOXES)
-    assert can_be_drawn(table, posture_trap.draw_trap)
+    assert list(table[table["element"] == posture_motions.ESCAPE]["x"]) == list(
+        posture_motions.BOXES
+    )
+    assert can_be_drawn(table, posture_motions.draw_trap)
 
 
 def test_expected_effort_counts_failures(outputs: Path) -> None:
@@ -151,9 +151,9 @@ def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
     assert [task.name for task in found] == ["surface", "point", "snake at a point"]
     table = population_effort.floor_table(found).set_index(["quantity", "task"])
     for task in found:
-        assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
+        assert list(task.by_value) == [0.0125, 0.025, 0.05, 0.1, 0.2, 0.4]
         medians = table.loc[(population_effort.RESIDUAL, task.name), "median"].astype(float)
-        expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
+        expected = np.polyfit(np.log(list(task.by_value)), np.log(medians), 1)[0]
         assert population_effort.slope(task) == pytest.approx(expected)
     assert can_be_drawn(table.reset_index(), population_effort.draw_floor)
 
@@ -162,7 +162,8 @@ def test_a_series_without_points_is_not_in_the_legend() -> None:
     shown = SizeComparison("ball", 200.0, 0.5, Interval(0.4, 0.6), 1.0)
     empty = SizeComparison("narrow gate", 200.0, 0.0, Interval(0.0, 0.0), 1.0)
     rows = {"cycles": [shown, empty]}
-    table = population_effort.ratios_table(rows, ["ball", "narrow gate"], 100.0)
+    tasks = tuple(measures.Task(name, {}) for name in ("ball", "narrow gate"))
+    table = population_effort.ratios_table(rows, tasks, 100.0)
     figure = population_effort.draw_ratios(table, "λ [-]")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["ball"]
 

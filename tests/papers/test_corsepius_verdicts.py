@@ -177,7 +177,7 @@ def test_empty_scenes_are_controls_and_make_no_claims_of_their_own() -> None:
     assert found
     assert not [text for text in found if text.split(":")[0].endswith("empty scene")]
     main = made_up("corsepius_gate_wide", partial(task_rows, {})).main
-    pairs = [(c.label, empty.label) for c, empty in measures.with_empty_scenes(main)]
+    pairs = [(c.label, empty.label) for c, empty in measures.pairs_but_for("empty_scene", main)]
     assert pairs == [(c.label, f"{c.label}, empty scene") for c in measures.obstructed(main)]
 
 

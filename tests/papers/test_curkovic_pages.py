@@ -8,9 +8,8 @@ import pandas as pd
 import pytest
 
 from evoexp.configuration import compose
-from evoexp.papers.curkovic import compared_settings, hall_shares, link_motions, measures
+from evoexp.papers.curkovic import compared_settings, measures
 from evoexp.papers.curkovic.figures import (
-    link_intersection,
     motion_curves,
     pareto_fronts,
     robot_motions,
@@ -62,7 +61,7 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
 
 
 def test_the_intersection_lies_on_both_vectors(motion: ConditionResults) -> None:
-    table = link_intersection.intersection_table(motion).set_index("element")
+    table = motion_curves.intersection_table(motion).set_index("element")
     start, end = table[["x", "y"]].astype(float), table[["x_end", "y_end"]].to_numpy(float)
     ends = pd.DataFrame(end, table.index, ["x", "y"])
     for vector, name in (("b", "mu"), ("d", "nu")):
@@ -131,7 +130,7 @@ def test_joints_start_at_rest_with_the_limits_of_equation_2(outputs: Path) -> No
 @pytest.mark.matrix
 def test_the_lines_of_tools_are_further_apart_than_their_bodies(outputs: Path) -> None:
     condition = smoke_results(outputs, "curkovic_safety").conditions[0]
-    assert (link_motions.tool_distance(condition) >= condition.column("clearance")).all()
+    assert (measures.tool_distance(condition) >= condition.column("clearance")).all()
 
 
 def changed(own: ConditionResults, costs: np.ndarray, refuted: np.ndarray) -> ConditionResults:
@@ -149,23 +148,21 @@ def test_a_refuted_run_counts_as_worse_than_any(motion: ConditionResults) -> Non
     assert measures.exemplar(some) == 2  # the cheapest one that is not refuted
     none = changed(motion, costs, np.array([True] * 3))
     assert measures.exemplar(none) == 1
-    assert np.isnan(hall_shares.not_refuted(none)).all()
+    assert np.isnan(compared_settings.not_refuted(none)).all()
 
 
 def test_shares_of_a_gain_are_what_medians_say(motion: ConditionResults) -> None:
     rng, false = np.random.default_rng(0), np.zeros(40, dtype=bool)
     costs = [level + 0.1 * rng.random(40) for level in (10.0, 9.0, 8.0)]
     nothing, elites, hall = (changed(motion, each, false) for each in costs)
-    corner = hall_shares.Corner("", nothing, (elites,), hall, None, ())
-    measure, settings = hall_shares.gains(9.0)[0], page_settings("curkovic_hall")
-    found = hall_shares.share(corner, measure, elites, hall, settings)
+    gain, settings = compared_settings.gains(9.0)[0], page_settings("curkovic_hall")
+    found = compared_settings.share(gain, (nothing, elites, hall), settings)
     none, some, most = map(np.median, costs)
     assert found.value == pytest.approx((none - some) / (none - most))
     assert found.interval.low < found.value < found.interval.high < found.interval.low + 0.1
     assert found.n == (40, 40, 40)
     # a hall that gains nothing leaves no share
-    worse = corner._replace(nothing=hall, hall=nothing)
-    nobody = hall_shares.share(worse, measure, elites, nothing, settings)
+    nobody = compared_settings.share(gain, (hall, elites, nothing), settings)
     assert np.isnan([nobody.value, *nobody.interval]).all()
 
 
@@ -201,13 +198,8 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
     assert any(each.startswith("solved motion collides between") for each in headings)
 
 
-def test_curves_show_three_defects(outputs: Path) -> None:
+def test_curves_are_compared_in_their_contacts(outputs: Path) -> None:
     found = page(outputs, "curkovic_motion", "curkovic_sweep")
-    table = drawing(found, "defects")
-    defects = ["collide in between", "leave [0, π]", "too fast (Eq. 2)"]
-    assert list(table["defect"].unique()) == defects
-    assert table["share"].between(table["lower"], table["upper"]).all()
-    assert (table["failing"] <= table["solved"]).all()
     assert set(drawing(found, "costs")["condition"]) == {"straight", "cubic spline"}
     assert len(drawing(found, "effects")) == 3
 
@@ -250,7 +242,7 @@ def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
     refuted, leaves, fast = measures.defects(condition)
     assert refuted == (condition.verdicts.solved_refuted, condition.solved)
     links = [
-        link_motions.sampled(link_motions.executed(condition.prepared, solution), 500).links
+        measures.sampled(measures.executed(condition.prepared, solution), 500).links
         for solution in condition.solutions.values()
     ]
     assert leaves.having == sum(q.min() < -1e-6 or q.max() > 180.0 + 1e-6 for q in links)

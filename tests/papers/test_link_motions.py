@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evoexp.condition import Prepared
-from evoexp.papers.curkovic import link_motions
+from evoexp.papers.curkovic import measures
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray
 from evoexp.report.results import motion_geometry
@@ -36,7 +36,7 @@ def solution(one: Prepared) -> FloatArray:
 
 @pytest.mark.examples(1)
 def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: FloatArray) -> None:
-    found = link_motions.sampled(link_motions.executed(one, solution), 10)
+    found = measures.sampled(measures.executed(one, solution), 10)
     assert found.links.shape == found.speeds.shape == (51, 2, 2)
     configurations = solution.reshape(2, 6, 2)
     np.testing.assert_allclose(found.links[::10].transpose(1, 0, 2), configurations, atol=1e-9)
@@ -46,31 +46,31 @@ def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: F
 
 @pytest.mark.examples(1)
 def test_speeds_are_differences_of_angles(one: Prepared, solution: FloatArray) -> None:
-    found = link_motions.sampled(link_motions.executed(one, solution), 2000)
+    found = measures.sampled(measures.executed(one, solution), 2000)
     off = np.abs(np.diff(found.links, axis=0) * 2000 - found.speeds[:-1]).max()
     # a step of 1/2000 against accelerations of some speeds per instant
     assert off < 0.002 * np.abs(found.speeds).max()
-    expected = (np.abs(found.speeds).max(axis=0) / link_motions.speed_limits(one)).max()
-    assert link_motions.times_over_limit(one, solution) == pytest.approx(expected, rel=1e-4)
+    expected = (np.abs(found.speeds).max(axis=0) / measures.speed_limits(one)).max()
+    assert measures.over_limit(one, solution) == pytest.approx(expected, rel=1e-4)
 
 
 def test_limits_are_those_of_equation_2(linear: Prepared) -> None:
     limits = np.degrees([[0.1, 0.2]] * 2)
-    np.testing.assert_allclose(link_motions.speed_limits(linear), limits)
+    np.testing.assert_allclose(measures.speed_limits(linear), limits)
     steps = np.abs(np.degrees(linear.problem.goal - linear.problem.start)) / 5.0
-    line = link_motions.straight(linear)
-    assert link_motions.times_over_limit(linear, line) == pytest.approx((steps / limits).max())
+    line = measures.straight(linear)
+    assert measures.over_limit(linear, line) == pytest.approx((steps / limits).max())
 
 
 @pytest.mark.matrix
 def test_a_control_has_the_limits_of_the_planner_beside_it(linear: Prepared) -> None:
-    control = link_motions.speed_limits(prepared("control=random_search"))
-    np.testing.assert_array_equal(control, link_motions.speed_limits(linear))
+    control = measures.speed_limits(prepared("control=random_search"))
+    np.testing.assert_array_equal(control, measures.speed_limits(linear))
 
 
 def test_a_contact_lies_on_both_bodies(linear: Prepared) -> None:
     planner, problem = linear
-    line = link_motions.straight(linear)
+    line = measures.straight(linear)
     motion = planner.motion(problem, line)
     found = judge_motion(planner, problem, motion)
     assert found.certified is False and found.refuted_at is not None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from evoexp.papers.rana import claims as paper_claims
-from evoexp.papers.rana import measures, motions
+from evoexp.papers.rana import measures
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.records import generations
 from evoexp.report.pages.page_builder import page_of
@@ -35,14 +35,14 @@ def of_best(condition: ConditionResults, values: np.ndarray) -> float:
 
 def steps_of_arms(condition: ConditionResults) -> list[np.ndarray]:
     """Return the lengths of the steps of each arm in the best motion [deg]."""
-    q = motions.best_motion(condition)
-    parts = (q[a:b] for a, b in motions.problem(condition).arm_slices)
+    q = measures.best_motion(condition)
+    parts = (q[a:b] for a, b in condition.prepared.problem.arm_slices)
     return [np.linalg.norm(np.diff(part, axis=1), axis=0) for part in parts]
 
 
 def test_approaches_by_kind_make_the_recorded_clearance(obstacles: ConditionResults) -> None:
-    found = motions.approaches(obstacles)
-    assert set(found["kind"]) == {motions.ARMS, motions.OBSTACLES}
+    found = measures.approaches(obstacles)
+    assert set(found["kind"]) == {measures.BETWEEN_ARMS, measures.TO_OBSTACLES}
     runs = found.groupby("replicate")
     assert runs["clearance"].min().to_numpy() == pytest.approx(obstacles.column("clearance"))
     kept = obstacles.summaries["certified_margin"].tolist()
@@ -50,19 +50,18 @@ def test_approaches_by_kind_make_the_recorded_clearance(obstacles: ConditionResu
 
 
 def test_distances_to_obstacles_are_drawn_for_every_replicate(obstacles: ConditionResults) -> None:
-    sampled = planar_motion.sampled_distances(obstacles, 5)
-    table = planar_motion.distances_table(obstacles, sampled)
-    for kind, margin in ((motions.ARMS, 1.0), (motions.OBSTACLES, 0.5)):
+    table = planar_motion.distances_table(obstacles, 5)
+    for kind, margin in ((measures.BETWEEN_ARMS, 1.0), (measures.TO_OBSTACLES, 0.5)):
         own = table[table["kind"] == kind]
         assert set(own["safety_distance"]) == {margin}
         exact = own[own["series"].isin([planar_motion.CLOSEST, planar_motion.REFUTED])]
         assert len(exact) == obstacles.done, "no replicate is dropped"
     # by hand: the least distance of circle centres to the ball at (5, 4.6) of radius 0.4
-    problem = motions.problem(obstacles)
+    problem = obstacles.prepared.problem
     centres = np.vstack(problem.sphere_centres(problem.start))
     ball = np.linalg.norm(centres - [5.0, 4.6, 0.0], axis=1).min() - 0.4
     assert problem.obstacle_distances(problem.start[:, None])[0] <= ball + 1e-9
-    assert sampled["centres_to_obstacles"].min() >= 0.0
+    assert table["distance"].min() >= 0.0
     titles = [axes.get_title() for axes in planar_motion.draw_distances(table).axes]
     assert [title[0] for title in titles] == ["a", "c", "b", "d"]
 
@@ -95,7 +94,7 @@ def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
     (condition, *_) = smoke_results(outputs, "rana_crossover", *WORDS).conditions
     shares = measures.kept_apart(condition)
     assert list(shares) == [0]  # three generations only
-    planner, problem = condition.planner, motions.problem(condition)
+    planner, problem = condition.planner, condition.prepared.problem
     first = next(iter(generations(planner.evolve(problem, condition.condition.rng(0)))))
     parts = [first.population[a:b, 1:-1, :12] for a, b in problem.arm_slices]
     near = [
@@ -110,7 +109,7 @@ def test_the_page_of_the_weights_tells_what_a_collision_costs(outputs: Path) -> 
     found = page(outputs, "rana_collision_weight", *WORDS)
     assert [row[1] for row in found.tables[0].rows] == ["10°", "1°", "3°", "30°", "100°"]
     printed = smoke_results(outputs, "rana_collision_weight", *WORDS).conditions[0]
-    problem = motions.problem(printed)
+    problem = printed.prepared.problem
     way = problem.goal - problem.start
     straight = np.linalg.norm(way[:3]) + np.linalg.norm(way[3:])
     assert f"{100 * 10 / straight:.1f} %" in found.claims[1].evidence

@@ -16,7 +16,7 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.rana import claims as rana_claims
-from evoexp.papers.rana import motions
+from evoexp.papers.rana import measures
 from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
@@ -184,9 +184,9 @@ def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> 
 
 def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
     search = results.conditions[1]
-    assert 0 <= motions.colliding_after(search, relaxed=False) <= search.solved
+    assert 0 <= measures.colliding_after(search, relaxed=False) <= search.solved
     none = dataclasses.replace(search, summaries=search.summaries.assign(solved=False))
-    assert motions.colliding_after(none, relaxed=True) == 0
+    assert measures.colliding_after(none, relaxed=True) == 0
 
 
 def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures import planar_models, planar_motion
 from evoexp.report.figures import convergence, effects, shares, style
 from evoexp.report.figures.effects import draw_box
@@ -202,18 +201,16 @@ def test_paths_of_all_or_of_some_replicates_are_drawn(
     condition = dataclasses.replace(ga)
     solutions = [*ga.solutions.values()] * copies
     vars(condition)["solutions"] = dict(enumerate(solutions))
-    monkeypatch.setattr(motions, "MOST_PATHS", most)
+    monkeypatch.setattr(planar_motion, "MOST_PATHS", most)
     table = planar_motion.paths_table(condition)
     assert sorted(table["replicate"].unique()) == list(range(-1, min(len(solutions), most)))
     ends = table[(table["arm"] == 0) & (table["instant"] == 20)][["joint_1_deg", "joint_2_deg"]]
     np.testing.assert_allclose(ends, [[135.0, 135.0]] * len(ends))
-    assert words in texts(planar_motion.draw_paths(table))
+    assert words in texts(planar_motion.draw_paths(table, ["joint_1_deg", "joint_2_deg"]))
 
 
 def test_distances_are_best_and_envelope(ga: ConditionResults) -> None:
-    sampled = planar_motion.sampled_distances(ga, 4)
-    assert len(sampled) == 4 * 81  # straight line, best replicate, lowest and highest of all
-    table = planar_motion.distances_table(ga, sampled)
+    table = planar_motion.distances_table(ga, 4)
     rows = table.set_index(["measure", "series", "instant"])["distance"]
     centres, links = rows.loc[planar_motion.CENTRES], rows.loc[planar_motion.LINKS]
     for each in (centres, links):

@@ -5,6 +5,7 @@ are the axes that are drawn: "xy" or "xyz".
 """
 
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from matplotlib.lines import Line2D
 
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, style, surfaces
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.scenarios.obstacles import obstacle_table
 
 DASHES: Any = (0, (2, 1))
 DASHED: dict[str, Any] = {"linestyle": DASHES}
@@ -67,6 +71,14 @@ def draw_base(axes: Any, links: pd.DataFrame, names: str = "xy") -> None:
     axes.plot(*(links[name].iloc[:1] for name in names), "s", **square)
 
 
+def obstacle_edges(condition: ConditionResults, reach: float = 1.0) -> list[tuple[float, ...]]:
+    """Return the edges of the outlines of a scene's obstacles: number, x, y, x_end, y_end."""
+    outlines = motion_geometry.obstacle_outlines(
+        obstacle_table(condition.scenario.obstacles), reach
+    )
+    return [(k, *a, *b) for k, outline in enumerate(outlines) for a, b in pairwise(outline)]
+
+
 def trail_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
     """Return the entries of a legend for trails of arms, counted from 0."""
     grey = style.NEUTRAL
@@ -84,11 +96,9 @@ def arm_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
     return [style.key(text, color=colour, linewidth=WIDE) for text, colour in colours.items()]
 
 
-def room(
-    table: pd.DataFrame, names: str = "xy", share: float = 0.08
-) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest place of links, each (names,), and a share of room around."""
-    ends = np.array([table[[name, f"{name}_end"]] for name in names], dtype=np.float64)
+def room(table: pd.DataFrame, share: float = 0.08) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest place of links in the plane, (2,), with room around."""
+    ends = np.array([table[[name, f"{name}_end"]] for name in "xy"], dtype=np.float64)
     low, high = np.nanmin(ends, axis=(1, 2)), np.nanmax(ends, axis=(1, 2))
     pad = share * float((high - low).max())
     return low - pad, high + pad
@@ -107,13 +117,18 @@ def planes(table: pd.DataFrame, count: int, per_line: int = 2) -> tuple[Figure, 
     return figure, panels
 
 
+def space_of_links(figure: Figure, place: tuple[int, int, int], links: pd.DataFrame) -> Any:
+    """Return axes in space that hold some links."""
+    ends = links[["x", "y", "z", "x_end", "y_end", "z_end"]].to_numpy().reshape(-1, 3)
+    return space(figure, place, ends, links["length_unit"].iloc[0])
+
+
 def space(
-    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, **look: Any
+    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, zoom: float = 0.95
 ) -> Any:
     """Return axes in space, with equal scales, that hold some points (points, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    usual: dict[str, Any] = {"view": (22.0, -55.0), "zoom": 0.95, "label_pads": (-7, -7, -7)}
-    look = usual | {"ticks": (2, 4)} | look
-    return surfaces.space(figure, place, low, high, pad, unit, **look)
+    look: dict[str, Any] = {"view": (22.0, -55.0), "label_pads": (-7, -7, -7), "ticks": (2, 4)}
+    return surfaces.space(figure, place, low, high, pad, unit, zoom=zoom, **look)

@@ -36,11 +36,6 @@ class Group(NamedTuple):
         return self.conditions[0]
 
     @property
-    def all(self) -> tuple[ConditionResults, ...]:
-        """The conditions, and the reference if it is there."""
-        return self.conditions if self.truth is None else (*self.conditions, self.truth)
-
-    @property
     def title(self) -> str:
         """Name and weights, over a panel."""
         return f"{self.name}  ε = {self.weights[0]:g}, λ = {self.weights[1]:g}"

@@ -7,6 +7,7 @@ import numpy as np
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Tasks
+from evoexp.planners.posture_es.phases import Problem
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
@@ -44,7 +45,7 @@ def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
         objects = [getattr(phase.goal, "object", "") for phase in c.scenario.phases]
         if objects == [BALL] and c.solved:
             times, cycles = 1e3 * measures.usual_seconds(c), measures.cycles(c)
-            shapes = measures.problem(c).bodies.num_shapes
+            shapes = c.problem(Problem).bodies.num_shapes
             words = {"milliseconds": times, "cycles": cycles, "shapes": shapes}
             verdict = f"{judging.NOT_JUDGED} (another machine, another model)"
             yield judge.on("planning_time", who=c.label).made(words, c.done, verdict)
@@ -61,7 +62,7 @@ def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
         runs = sum(c.done for c in arms)
         yield judge.on("redundant_arms").own(told, runs, any(free.values()))
     # the search gets stuck where the same task with a sub-goal finds a way
-    for stuck, helped in measures.subgoal_pairs(found):
+    for stuck, helped in measures.pairs_but_for("subgoals", found):
         one, two = run_measures.success(helped), run_measures.success(stuck)
         told = (
             f"goal met {judge.share(two)}; {helped.label}: {judge.share(one)}; "
@@ -71,7 +72,7 @@ def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
         yield judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
     if results.experiment in judge.rules["times_vary"].experiments:
         yield _unforeseeable(judge, found)
-    if pairs := measures.with_empty_scenes(results.main):
+    if pairs := measures.pairs_but_for("empty_scene", results.main):
         yield _at_obstacles(judge, pairs)
 
 

@@ -30,13 +30,7 @@ class Task(NamedTuple):
     """Conditions that differ in one setting of the planner."""
 
     name: str  # the common part of their labels
-    values: tuple[float, ...]  # values of that setting, ascending
-    conditions: Conditions  # one per value
-
-    @property
-    def by_value(self) -> dict[float, ConditionResults]:
-        """The condition of each value that has results."""
-        return dict(zip(self.values, self.conditions, strict=True))
+    by_value: dict[float, ConditionResults]  # value of that setting, ascending → its condition
 
 
 class Tasks(tuple[Task, ...]):
@@ -45,22 +39,7 @@ class Tasks(tuple[Task, ...]):
     @property
     def conditions(self) -> Conditions:
         """All of their conditions."""
-        return tuple(c for task in self for c in task.conditions)
-
-    @property
-    def names(self) -> list[str]:
-        """Their names."""
-        return [task.name for task in self]
-
-    @property
-    def num_runs(self) -> int:
-        """Their finished runs."""
-        return sum(c.done for c in self.conditions)
-
-
-def problem(condition: ConditionResults) -> Problem:
-    """Return the prepared task."""
-    return condition.problem(Problem)
+        return tuple(c for task in self for c in task.by_value.values())
 
 
 def scene(condition: ConditionResults) -> tuple[Any, Any]:
@@ -88,7 +67,7 @@ def tasks(results: Results, setting: str, of: str = "ga") -> Tasks:
 
     groups = (sorted(group, key=value) for group in run_measures.grouped(results.main, key))
     return Tasks(
-        Task(own[0].label.split(", ")[0], tuple(map(value, own)), tuple(own))
+        Task(own[0].label.split(", ")[0], {value(c): c for c in own})
         for own in groups
         if len(own) > 1
     )
@@ -161,19 +140,9 @@ def tolerances(condition: ConditionResults) -> tuple[float, ...]:
     return tuple(phase.position_tolerance or task.position_tolerance for phase in task.all_phases)
 
 
-def subgoal_pairs(conditions: Conditions) -> list[Pair]:
-    """Return the conditions without sub-goals, each with itself with sub-goals."""
-    return _pairs_but_for(conditions, "subgoals")
-
-
 def obstructed(main: Conditions) -> Conditions:
     """Return the conditions whose obstacles stand."""
     return tuple(c for c in main if not c.scenario.empty_scene)
-
-
-def with_empty_scenes(conditions: Conditions) -> list[Pair]:
-    """Return the conditions that have an empty scene as a control, each with its control."""
-    return _pairs_but_for(conditions, "empty_scene")
 
 
 def obstacles_act(condition: ConditionResults, results: Results) -> bool:
@@ -190,8 +159,8 @@ def obstacles_act(condition: ConditionResults, results: Results) -> bool:
     return not costs[0].equals(costs[1])
 
 
-def _pairs_but_for(conditions: Conditions, setting: str) -> list[Pair]:
-    """Return (one without a setting of the task, the same one with it)."""
+def pairs_but_for(setting: str, conditions: Conditions) -> list[Pair]:
+    """Return (one without a setting of the task, the same one with it): sub-goals, empty scenes."""
 
     def key(condition: ConditionResults) -> tuple[Any, ...]:
         robot, task = scene(condition)
@@ -215,7 +184,7 @@ def releases(condition: ConditionResults) -> list[tuple[float, float]]:
     The gap is to the nearest body that it may touch, negative where it stands in it [length unit],
     the tilt that of its axis from the direction up [rad].
     """
-    own, found = problem(condition), []
+    own, found = condition.problem(Problem), []
     for q in paths(condition).values():
         for span in own.spans(q):
             if span.stage.phase.then == "detach" and span.reached:

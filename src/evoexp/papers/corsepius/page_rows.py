@@ -10,6 +10,7 @@ from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.claims import METRICS
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
 from evoexp.papers.corsepius.measures import Conditions, Tasks
+from evoexp.planners.posture_es.phases import Problem
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
@@ -37,7 +38,7 @@ def tilts(results: Results) -> Iterator[Quantity]:
 
 def beside_empty(results: Results, confidence: float) -> tuple[tuple[str, ...], ...]:
     """Return a row per task that has an empty scene as its control: shares, test, cycles."""
-    pairs = measures.with_empty_scenes(results.main)
+    pairs = measures.pairs_but_for("empty_scene", results.main)
     shares = [(run_measures.success(c), run_measures.success(e)) for c, e in pairs]
     return tuple(
         (
@@ -74,20 +75,6 @@ def phase_rows(phased: Conditions, confidence: float) -> Iterator[tuple[object, 
             yield condition.label, f"{k + 1}  {name}", reached, cycles
 
 
-def collision_models(main: Conditions) -> Iterator[tuple[str, str]]:
-    """Yield a row on the collision model of every robot."""
-    for c in measures.robots(main):
-        bodies = measures.problem(c).bodies
-        pairs = bodies.sorted_pairs
-        text = (
-            f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most "
-            f"{bodies.inflation:.3g} {c.length_unit} beyond them; pairs of bodies: "
-            f"{len(pairs.tested)} tested, {len(pairs.adjacent)} neighbours or disabled, "
-            f"{len(pairs.always)} always touch, {len(pairs.never)} never do"
-        )
-        yield f"{c.label}: the model of collisions", text
-
-
 def manoeuvres(results: Results, phased: Conditions) -> list[tuple[list[ShownPath], str]]:
     """Return the runs whose phases are drawn one by one, each with the end of its figure's stem."""
     several = [c for c in phased if len(c.scenario.phases) > 1]
@@ -115,16 +102,7 @@ def scopes(results: Results) -> Tasks:
     if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
         return Tasks()
     found = measures.tasks(results, "scope", "")
-    return Tasks(task for task in found if not any(c.solved for c in task.conditions))
-
-
-def floor_rows(main: Conditions, scopes: Tasks) -> list[tuple[str, ...]]:
-    """Return the distances at which searches stagnate, if no goal can be met."""
-    columns = (lambda c: 1e3 * measures.residuals(c)), measures.cycles
-    return [
-        (c.label, *(markdown.spread(inference.spread(values(c))) for values in columns))
-        for c in (main if scopes else ())
-    ]
+    return Tasks(task for task in found if not any(c.solved for c in task.by_value.values()))
 
 
 def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...]]:
@@ -168,6 +146,8 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "shown_task": lambda obstructed: obstructed[:1],
     # the conditions that have several phases
     "phased": lambda obstructed: tuple(c for c in obstructed if len(measures.phase_names(c)) > 1),
+    "bodies": lambda condition: condition.problem(Problem).bodies,
+    "thousandths": lambda condition: 1e3 * measures.residuals(condition),  # of the residuals
     # (title, condition) of every robot
     "titled_robots": lambda robots: [
         (c.label if len(robots) > 1 else "the robot", c) for c in robots
@@ -188,6 +168,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         conditions=measures.obstructed(results.conditions)
     ),
     "sizes": lambda results: measures.tasks(results, "num_offspring"),
+    "num_runs": lambda sizes: sum(c.done for c in sizes.conditions),
     "size_ratios": lambda sizes, settings: {
         metric: claims.compare_sizes(sizes, metric, settings) for metric in METRICS
     },

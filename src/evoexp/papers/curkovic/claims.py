@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.papers.curkovic import link_motions, measures
+from evoexp.papers.curkovic import measures
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
@@ -98,7 +98,7 @@ def compared_radii(radius_conditions: Conditions, settings: ReportSettings) -> R
         return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
 
     pairs = [(own[-1], own[0]) for own in _by_substeps(radius_conditions) if len(own) > 1]
-    return compared(pairs, link_motions.tool_distance, settings, lower_is_better=False, named=named)
+    return compared(pairs, measures.tool_distance, settings, lower_is_better=False, named=named)
 
 
 def tool_comparisons(compared_radii: Rows) -> list[tuple[str, Rows]]:
@@ -110,7 +110,7 @@ def tools(results: Results, compared_radii: Rows) -> list[Quantity]:
     """Return the row of end-effectors' distances where radii differ."""
     name = f"{KEPT}, its centre line"
     unit = results.with_data[0].length_unit
-    row = quantity(results, name, unit, link_motions.tool_distance) if compared_radii else None
+    row = quantity(results, name, unit, measures.tool_distance) if compared_radii else None
     return [row] if row else []
 
 

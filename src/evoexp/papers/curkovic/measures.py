@@ -1,22 +1,27 @@
-"""Quantities that all pages on Curkovic et al. 2013 show: effort to a threshold, known defects."""
+"""Measures of Curkovic et al. 2013: executed motions, effort to a threshold, known defects."""
 
+import itertools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from evoexp.papers.curkovic import link_motions
+from evoexp.collision.planar.planar_arms import Arm
+from evoexp.condition import Prepared
+from evoexp.numeric.elementary import DEGREE
+from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import BoolArray, FloatArray
 from evoexp.report.pages.page_parts import PlayedRun
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import counted, search_seconds, solved, summed, touches
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
 from evoexp.report.statistics import inference
 from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.inference import Proportion, quantile
 
+TOOL_SAMPLES = 20  # per segment, where end-effectors' distances from other robots are measured
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 EARLY = 30  # generation that the paper's Fig. 5 calls an early phase
 INSTANTS = 100  # of a segment, at which the paper's model looks for contacts of whole motions
@@ -38,8 +43,8 @@ def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:
 def lower_bound(condition: ConditionResults) -> float:
     """Return a lower bound of a team's cost: straight paths, least turns, no unevenness."""
     problem, objective = condition.problem(Problem), condition.planner.objective
-    arms, total = link_motions.arms(condition.prepared), 0.0
-    for arm, start, goal in zip(arms, problem.start, problem.goal, strict=True):
+    robots, total = arms(condition.prepared), 0.0
+    for arm, start, goal in zip(robots, problem.start, problem.goal, strict=True):
         first, last = (arm.outlines(q.reshape(1, 2, 1))[0, 2:4, 0] for q in (start, goal))
         path = float(np.sqrt(np.sum((last - first) ** 2)))
         turns = float(np.sum(np.abs(goal - start)))
@@ -175,9 +180,14 @@ def defects(condition: ConditionResults) -> Defects:
 
 def times_over_limit(condition: ConditionResults) -> FloatArray:
     """Return each run's greatest speed of a link over its limit by Eq. 2, (done,) [-]."""
-    prepared = condition.prepared
-    solutions = [condition.solutions[int(k)] for k in condition.summaries.index]
-    return np.array([link_motions.times_over_limit(prepared, solution) for solution in solutions])
+    solutions = (condition.solutions[int(k)] for k in condition.summaries.index)
+    return np.array([over_limit(condition.prepared, solution) for solution in solutions])
+
+
+def over_limit(prepared: Prepared, solution: FloatArray) -> float:
+    """Return the greatest speed of any link during a motion, over its limit by Eq. 2 [-]."""
+    turns = top_speeds(executed(prepared, solution)).reshape(-1, 2) / DEGREE
+    return float(np.max(turns / speed_limits(prepared)))
 
 
 def _first(condition: ConditionResults, threshold: float, column: str) -> FloatArray:
@@ -189,6 +199,89 @@ def _first(condition: ConditionResults, threshold: float, column: str) -> FloatA
 def _of_runs(condition: ConditionResults, values: pd.Series) -> FloatArray:
     """Return values by replicate as (done,), infinite where a run has none."""
     return values.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
+
+
+class SampledMotion(NamedTuple):
+    """A motion at many instants."""
+
+    instants: FloatArray  # (samples,), whole numbers are the configurations
+    links: FloatArray  # (samples, robots, 2) absolute link angles from +x [deg]
+    # (samples, robots, 2) their turns per instant, at the right of each instant [deg]
+    speeds: FloatArray
+
+    @property
+    def q(self) -> FloatArray:
+        """(nq, samples) joint angles, of second links against the first [deg]."""
+        relative = self.links.copy()
+        relative[:, :, 1] -= relative[:, :, 0]
+        return np.ascontiguousarray(relative.reshape(len(relative), -1).T)
+
+
+def arms(prepared: Prepared) -> tuple[Arm, ...]:
+    """Return base and link lengths of every robot."""
+    return tuple(Arm((x, y), (one, two)) for x, y, one, two in prepared.problem.arms.tolist())
+
+
+def executed(prepared: Prepared, solution: FloatArray) -> Motion:
+    """Return the motion that a solution executes, in absolute link angles [rad].
+
+    Straight lines or cubic curves lead from configuration to configuration, robot by robot.
+    """
+    polynomials = prepared.planner.motion(prepared.problem, solution).polynomials.copy()
+    polynomials[..., 1::2] += polynomials[..., ::2]  # joints turn against the link before
+    return cubic_motion(polynomials)
+
+
+def sampled(motion: Motion, samples: int) -> SampledMotion:
+    """Sample a motion in absolute link angles."""
+    segments = motion.num_segments
+    instants = np.arange(segments * samples + 1) / samples
+    before = np.minimum(instants.astype(np.int64), segments - 1)
+    u = (instants - before)[:, None]
+    c0, c1, c2, c3 = motion.polynomials[before].transpose(1, 0, 2)
+    shape = (len(instants), -1, 2)
+    angles, speeds = c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3)
+    return SampledMotion(instants, angles.reshape(shape) / DEGREE, speeds.reshape(shape) / DEGREE)
+
+
+def speed_limits(prepared: Prepared) -> FloatArray:
+    """Return how far links may turn per sampling step (Eq. 2), (robots, 2) [deg]."""
+    limit = wrapped(prepared.planner).speed_limit
+    return np.array([limit.greatest_steps(arm.lengths) for arm in arms(prepared)])
+
+
+def straight(prepared: Prepared) -> FloatArray:
+    """Return the solution whose link angles go straight from start to goal, flat [deg]."""
+    planner, problem = prepared
+    ends = problem.start.ravel(), problem.goal.ravel()
+    return motion_geometry.straight_line(planner.shape(problem), *ends) / DEGREE
+
+
+def tool_distance(condition: ConditionResults) -> FloatArray:
+    """Return how near any end-effector comes to a link of another robot, (done,) [length unit].
+
+    Links and end-effectors have no thickness here.
+    """
+    found, assembly = [], condition.prepared.problem.assembly
+    for k in condition.summaries.index:
+        motion = executed(condition.prepared, condition.solutions[int(k)])
+        places = motion_geometry.joint_positions(assembly, sampled(motion, TOOL_SAMPLES).q)
+        links = [(robot, start, end) for robot, link, start, end in places if link < 2]
+        tips = {robot: end for robot, _, end in links}
+        distances = (
+            to_segment(tip, start, end)
+            for (robot, tip), (other, start, end) in itertools.product(tips.items(), links)
+            if robot != other
+        )
+        found.append(min(distances))
+    return np.array(found)
+
+
+def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
+    """Return the least distance of points from segments, row by row; each (rows, 2 or 3)."""
+    along = end - start
+    share = np.clip(((points - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.sqrt(((points - start - share[:, None] * along) ** 2).sum(axis=1)).min())
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {

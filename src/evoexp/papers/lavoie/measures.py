@@ -23,6 +23,7 @@ Contact = tuple[float, str]
 errors = run_measures.where_solved(by_column("term_position_error_sp2"))
 effort = run_measures.where_solved(by_column("evaluations"))
 BOUNDS = (1.0, 2.0)  # those of the printed percentages
+BOUND = BOUNDS[0]  # by which the percentages differ most
 
 
 class Percentage(NamedTuple):
@@ -30,19 +31,14 @@ class Percentage(NamedTuple):
 
     joints: int  # number of joints of the arm
     bound: float  # x of P(position error < x) [length unit]
-    having: int  # number of the thousand runs with a smaller error
-
-    @property
-    def proportion(self) -> Proportion:
-        """Proportion of the paper's own runs, which are a sample, too."""
-        return Proportion(self.having, PRINTED_RUNS)
+    proportion: Proportion  # of the paper's own runs, which are a sample, too
 
 
 PRINTED = (
-    Percentage(7, 1.0, 935),
-    Percentage(7, 2.0, 998),
-    Percentage(10, 1.0, 991),
-    Percentage(10, 2.0, 1000),
+    Percentage(7, 1.0, Proportion(935, PRINTED_RUNS)),
+    Percentage(7, 2.0, Proportion(998, PRINTED_RUNS)),
+    Percentage(10, 1.0, Proportion(991, PRINTED_RUNS)),
+    Percentage(10, 2.0, Proportion(1000, PRINTED_RUNS)),
 )
 
 
@@ -59,6 +55,12 @@ def printed(condition: ConditionResults) -> list[Percentage]:
 def below(condition: ConditionResults, bound: float) -> Proportion:
     """Count the runs that have a solution with a position error below a bound."""
     return run_measures.counted(errors(condition) < bound)
+
+
+def runs_by_attempts(condition: ConditionResults) -> str:
+    """Return how many runs took each number of attempts: "1: 985, 2: 15"."""
+    numbers, counts = np.unique(condition.column("term_attempts"), return_counts=True)
+    return ", ".join(f"{n:.0f}: {count}" for n, count in zip(numbers, counts, strict=True))
 
 
 def tests_per_second(condition: ConditionResults) -> FloatArray:
@@ -106,9 +108,6 @@ def refuted(condition: ConditionResults) -> RefutedMotions:
             touching[row, int(instant >= 1.0)] = True
     paths = touching[run_measures.solved(condition)]
     return RefutedMotions(*map(run_measures.counted, (paths.any(axis=1), *paths.T)))
-
-
-BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
 
 
 def untouched(condition: ConditionResults) -> BoolArray:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from evoexp.papers.rana import measures, motions
+from evoexp.papers.rana import measures
 from evoexp.papers.rana.measures import AT, BETWEEN, EVENNESS
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.pages import markdown
@@ -198,13 +198,13 @@ def _told(
 def extensions(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Judge section 5's claims of extension: static obstacles, more than two arms."""
     problem, unit = condition.problem(Problem), condition.length_unit
-    arms, kinds = problem.assembly.num_arms, motions.kinds_of_pairs(condition)
+    arms, kinds = problem.assembly.num_arms, measures.kinds_of_pairs(condition)
     found = []
-    if motions.OBSTACLES in kinds:
+    if measures.TO_OBSTACLES in kinds:
         found.append("The algorithm can easily be extended to static obstacles")
     if arms > 2:
         found.append(f"The algorithm plans for any multi-arm system, here for {arms} arms")
-    exact, verdicts = motions.approaches(condition), condition.verdicts
+    exact, verdicts = measures.approaches(condition), condition.verdicts
     told = [
         f"{kind} {markdown.number(float(own['clearance'].min()))} {unit} at least (required "
         f"{margin:g}, kept in {markdown.share(int(own['kept'].sum()), len(own))})"
@@ -224,8 +224,8 @@ def extensions(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
 
 def collision_weight(judge: Judge, first: ConditionResults) -> list[Claim]:
     """Judge that collisions are avoided at all costs, with the weight k3 as printed."""
-    straight, worth = motions.straight_length(first), motions.worth(first)
-    hits = first.evaluate(motions.straight_line(first))["collisions"]
+    straight, worth = measures.straight_length(first), measures.worth(first)
+    hits = first.evaluate(measures.straight_line(first))["collisions"]
     told = f"{markdown.share(first.solved, first.done)} finished runs end free at via-points"
     done, planned, share = first.done, first.planned, worth / straight
     evidence = (

@@ -1,15 +1,18 @@
-"""Quantities of single runs that several pages compare, and what evolution adds to its controls."""
+"""Measures of Rana & Zalzala 1995: motions of strings of via-points, and quantities of runs."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from evoexp.papers.rana import motions
+from evoexp.collision.certifier.verdict import certify
+from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray, generations
 from evoexp.report.pages import markdown
+from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.run_measures import grouped, summed
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons
@@ -23,11 +26,87 @@ EVENNESS = "unevenness of the best, C3 + C4"
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
 GENERATIONS = (0, 10, 50)  # whose pairs of strings are looked at
 PAIRS = 2000  # drawn of each generation
+BETWEEN_ARMS, TO_OBSTACLES = "between arms", "to obstacles"  # kinds of pairs of bodies
+STRAIGHT = "straight line"
 COST = comparisons.by_column("best_cost")
 
 
 # C3 + C4 + … of each run's best: sums of |step − mean step| (Eqs. 4, 5), (done,) [deg]
 unevenness = summed(UNEVENNESS)
+
+
+def best_motion(condition: ConditionResults) -> FloatArray:
+    """Return the configurations of the best replicate's motion, (nq, instants) [deg]."""
+    best = condition.solutions[condition.best_replicate]
+    return motion_geometry.configurations(condition.prepared, best)
+
+
+def straight_line(condition: ConditionResults) -> FloatArray:
+    """Return the solution that goes straight from start to goal, flat [deg]."""
+    found = condition.problem(Problem)
+    return motion_geometry.straight_line(condition.planner.shape(found), found.start, found.goal)
+
+
+def sampled(condition: ConditionResults, solution: FloatArray, samples: int) -> FloatArray:
+    """Return a solution's motion, sampled per segment, (nq, instants) [deg]."""
+    q = motion_geometry.configurations(condition.prepared, solution)
+    return motion_geometry.dense(q, samples)[1]
+
+
+def straight_length(condition: ConditionResults) -> float:
+    """Return the length of the straight paths of all arms together [deg]."""
+    found = condition.problem(Problem)
+    gap = found.goal - found.start
+    return float(sum(np.linalg.norm(gap[a:b]) for a, b in found.arm_slices))
+
+
+def worth(condition: ConditionResults) -> float:
+    """Return how many degrees of path cost as much as one colliding instant, k3 / k1."""
+    weights = condition.planner.objective
+    return float(weights.collision_weight / weights.length_weight)
+
+
+def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, float]]:
+    """Return the kinds of pairs of bodies: name → (pairs of the scene, required distance)."""
+    found = condition.problem(Problem)
+    among = obstacle_pairs(found.assembly, found.scene)
+    kinds = {
+        BETWEEN_ARMS: (~among, found.security_margin),
+        TO_OBSTACLES: (among, found.obstacle_margin),
+    }
+    return {name: kind for name, kind in kinds.items() if kind[0].any()}
+
+
+def approaches(condition: ConditionResults) -> pd.DataFrame:
+    """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
+
+    `refuted_at` is NaN where they touch nowhere; `kept` says whether the required distance is.
+    """
+    rows = []
+    for name, (kept, margin) in kinds_of_pairs(condition).items():
+        bodies = condition.problem(Problem).scene.of_pairs(kept)
+        for k in condition.solutions:
+            verdict = certify(bodies, condition.motion(k), margin)
+            where = verdict.clearance, verdict.clearance_at, verdict.refuted_at
+            rows.append((name, k, *where, verdict.margin_status == "certified"))
+    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def colliding_after(condition: ConditionResults, relaxed: bool) -> int:
+    """Count the collision-free final strings that collide once redistributed (and relaxed)."""
+    own, found = condition.planner, condition.problem(Problem)
+    step = own.relaxation_step if relaxed else 0.0
+    operator = own.model_copy(update={"redistribution": True, "relaxation_step": step})
+    strings = [
+        motion_geometry.configurations(condition.prepared, condition.solutions[int(k)])
+        for k in condition.summaries.index[run_measures.solved(condition)]
+    ]
+    if not strings:
+        return 0
+    rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
+    improved = operator.improve(found, np.stack(strings, axis=2), rng)
+    return int(np.count_nonzero(~own.cost(found, improved).feasible))
 
 
 def evolution_told(
@@ -44,7 +123,7 @@ def evolution_told(
     fitness = " · ".join(
         f"{c.label} {markdown.spread(c.spread('term_fitness'))}" for c in (condition, *shown)
     )
-    straight = condition.evaluate(motions.straight_line(condition))["fitness"]
+    straight = condition.evaluate(straight_line(condition))["fitness"]
     told = [f"fitness F: {fitness} · straight line {markdown.number(straight)}"]
     for place, control in enumerate(shown):
         row = rows[control.label]
@@ -71,12 +150,12 @@ def fits(results: Results) -> bool:
 
 def planar(condition: ConditionResults) -> bool:
     """Return whether the arms move in a plane."""
-    return bool(motions.problem(condition).assembly.table.planar)
+    return bool(condition.problem(Problem).assembly.table.planar)
 
 
 def margin(condition: ConditionResults) -> float:
     """Return the safety distance [length unit]."""
-    return motions.problem(condition).security_margin
+    return condition.problem(Problem).security_margin
 
 
 def _scenes(results: Results) -> list[tuple[Results, str]]:
@@ -93,7 +172,7 @@ def _scenes(results: Results) -> list[tuple[Results, str]]:
 def longer(condition: ConditionResults) -> FloatArray:
     """Return how much longer than the straight line each run's best paths are, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
-    return np.asarray(motions.straight_length(condition) * (ratio - 1.0))
+    return np.asarray(straight_length(condition) * (ratio - 1.0))
 
 
 def safety_share(condition: ConditionResults) -> FloatArray:
@@ -110,7 +189,7 @@ def refuted(condition: ConditionResults) -> Proportion:
 def length(condition: ConditionResults) -> FloatArray:
     """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
-    return np.asarray(motions.straight_length(condition) * ratio)
+    return np.asarray(straight_length(condition) * ratio)
 
 
 def drawable(condition: ConditionResults) -> bool:
@@ -154,7 +233,7 @@ def kept_apart(condition: ConditionResults) -> dict[int, float]:
 
     The first replicate is run again for some generations; sites and pairs are drawn at random.
     """
-    planner, problem = condition.planner, motions.problem(condition)
+    planner, problem = condition.planner, condition.problem(Problem)
     draw = np.random.Generator(np.random.PCG64(0))
     found = {}
     for generation in generations(planner.evolve(problem, condition.condition.rng(0))):
@@ -182,21 +261,23 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
     ),
     # least distance of centres along the straight line [length unit]
-    "straight_centres": lambda sampled_distances: float(
-        sampled_distances.loc[sampled_distances["series"] == motions.STRAIGHT, "centres"].min()
+    "straight_centres": lambda condition, samples: float(
+        condition.problem(Problem)
+        .centre_distances(sampled(condition, straight_line(condition), samples))
+        .min()
     ),
     # all conditions of each scene in the plane, or in space, and the end of its figure's stem
     "planar_scenes": lambda results: [s for s in _scenes(results) if planar(s[0].with_data[0])],
     "spatial_scenes": lambda results: [
         s for s in _scenes(results) if not planar(s[0].with_data[0])
     ],
-    "straight_terms": lambda condition: condition.evaluate(motions.straight_line(condition)),
+    "straight_terms": lambda condition: condition.evaluate(straight_line(condition)),
     # runs whose centres, or bodies, come closer than the safety distance
     "dips": lambda condition: int(np.sum(condition.column(BETWEEN) < margin(condition))),
     "closer": lambda condition: int(np.sum(condition.column("clearance") < margin(condition))),
     # free final strings that collide after redistribution, and after both operators
-    "redistributed": lambda condition: motions.colliding_after(condition, relaxed=False),
-    "relaxed": lambda condition: motions.colliding_after(condition, relaxed=True),
+    "redistributed": lambda condition: colliding_after(condition, relaxed=False),
+    "relaxed": lambda condition: colliding_after(condition, relaxed=True),
     # runs whose best string collides at a via-point by the paper's model
     "colliding": lambda condition: Proportion(condition.done - condition.solved, condition.done),
     "any_planar": lambda results: any(map(drawable, results.main)),

@@ -21,11 +21,6 @@ def hollow(axes: Axes, x: Any, y: Any, marker: str, colour: str, size: float, **
     axes.plot(x, y, marker, color="white", markeredgecolor=colour, markersize=size, **look)
 
 
-def base(axes: Axes, x: Any, y: Any, size: float, **look: Any) -> None:
-    """Draw the square of an arm's base."""
-    axes.plot(x, y, "s", color=style.NEUTRAL, markersize=size, **look)
-
-
 def contact(axes: Axes, x: Any, y: Any, size: float, **look: Any) -> None:
     """Draw crosses where bodies touch."""
     axes.plot(x, y, "X", color=style.FORBIDDEN, markeredgecolor="white", markersize=size, **look)

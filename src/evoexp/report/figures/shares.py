@@ -30,7 +30,7 @@ def shares_table(
     return table.assign(printed=table["quantity"].map(dict(printed)).astype("float64"))
 
 
-def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure:
+def draw_shares(table: pd.DataFrame) -> Figure:
     """Draw one panel per quantity, one row per condition, in one scale [%]."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
@@ -57,7 +57,7 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
         axes.set_xlim(low - beyond, high + beyond)
         is_wide = high - low >= NEARLY_ALL
         axes.xaxis.set_major_locator(MultipleLocator(25.0) if is_wide else style.few_ticks())
-        axes.set_xlabel(label)
+        axes.set_xlabel("share of runs [%]")
         axes.set_title(quantity, fontsize=7.5)
     panels[0].set_yticks(list(rows_of.values()), [labels[position] for position in rows_of])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)

@@ -1,6 +1,6 @@
 """Chen & Zalzala 1995, both searches joined: a safe path and a docking posture as one motion."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -97,24 +97,13 @@ def draw_missions(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def mission_checks(
-    conditions: Sequence[ConditionResults], confidence: float
-) -> Iterator[tuple[str, str]]:
-    """Yield the rows on every condition's exact verdicts and on its docking places."""
-    for condition in conditions:
-        label, found, scenario = condition.label, condition.verdicts, condition.scenario
-        free = Proportion(found.certified, found.judged)
-        nearest = condition.summaries["clearance_pair"].value_counts()
-        places = np.round(condition.column("term_platform_x"), 3)
-        near = np.count_nonzero(places < scenario.docking.target[0])
-        verdicts = (
-            f"{markdown.share(*free)} ({markdown.percent(free.interval(confidence))}) free "
-            f"of contact over the whole motion; {found.refuted} touch, {found.undecided} "
-            f"undecided; closest most often: {nearest.index[0]}"
-        )
-        spread = (
-            f"between {places.min():g} and {places.max():g}, {near} of {condition.done} on the "
-            "near side of the end-effector"
-        )
-        yield f"{label}: exact verdicts", verdicts
-        yield f"{label}: docking places X_p", spread
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # motions of a condition that are free of contact, of those judged
+    "free": lambda condition: Proportion(condition.verdicts.certified, condition.verdicts.judged),
+    "free_interval": lambda free, confidence: markdown.percent(free.interval(confidence)),
+    # the pair of bodies that is closest in most runs
+    "closest": lambda condition: condition.summaries["clearance_pair"].value_counts().index[0],
+    "places": lambda condition: np.round(condition.column("term_platform_x"), 3),
+    # docking places on the near side of the end-effector
+    "near": lambda condition, places: np.sum(places < condition.scenario.docking.target[0]),
+}

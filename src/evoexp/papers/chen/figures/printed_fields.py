@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
@@ -87,12 +86,38 @@ def compare(
 
 
 def draw_fields(table: pd.DataFrame) -> Figure:
-    """Draw one grid per field, with the number of every node, and mark where the print differs."""
+    """Draw a grid per field: a shaded square with a number per node, frames around slips."""
     count = table["field"].nunique()
     figure = style.figure(7.2 * 0.5 * 1.12, style.WIDTH * (1.0 if count > 1 else 0.55))
     panels = figure.subplots(1, count, squeeze=False)[0]
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
-        _draw_field(axes, rows, str(name))
+        height = int(rows["row"].max()) + 1
+        width = int(rows.loc[rows["slip"] != SURPLUS, "column"].max()) + 1
+        numbers = pd.to_numeric(rows["computed"], errors="coerce")
+        shades = 0.97 - 0.32 * numbers / float(np.nanmax(numbers))
+        for cell, shade in zip(records(rows), shades, strict=True):
+            x, y = cell.column, height - 1 - cell.row
+            if cell.slip:  # a token too many stands between two nodes
+                wide, left = (0.24, x - 0.62) if cell.slip == SURPLUS else (0.92, x - 0.46)
+                frame = Rectangle((left, y - 0.46), wide, 0.92, zorder=3, **FRAMES[cell.slip])
+                axes.add_patch(frame)
+            if cell.slip == SURPLUS:
+                continue
+            blocked = cell.computed == BLOCKED
+            face, ink = (style.NEUTRAL, "white") if blocked else (str(shade), "black")
+            square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, edgecolor="white", lw=0.5)
+            axes.add_patch(square)
+            # the number, lifted where a wrong one stands below
+            wrong = cell.slip == WRONG
+            axes.text(x, y + 0.12 * wrong, cell.computed, color=ink, **NUMBER)
+            if wrong:
+                axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **SMALL)
+        axes.grid(visible=False)
+        axes.set(
+            xlim=(-0.5, width - 0.3), ylim=(-0.5, height - 0.5), aspect="equal", title=str(name)
+        )
+        axes.set(xlabel="x [node]", xticks=range(0, width, 5))
+        axes.set(ylabel="y [node]", yticks=range(0, height, 5))
     keys = [
         Rectangle((0, 0), 1, 1, label=text, **FRAMES[slip])
         for slip, text in MARKED_SLIPS.items()
@@ -118,35 +143,6 @@ def draw_maps(table: pd.DataFrame) -> Figure:
         axes.grid(visible=False)
         axes.set(title=str(name), xlabel="x [node]", ylabel="y [node]", facecolor=style.NEUTRAL)
     return figure
-
-
-def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
-    """Draw a grid: a shaded square with a number per node, frames around slips."""
-    count = int(rows["row"].max()) + 1
-    width = int(rows.loc[rows["slip"] != SURPLUS, "column"].max()) + 1
-    numbers = pd.to_numeric(rows["computed"], errors="coerce")
-    shades = 0.97 - 0.32 * numbers / float(np.nanmax(numbers))
-    for cell, shade in zip(records(rows), shades, strict=True):
-        x, y = cell.column, count - 1 - cell.row
-        if cell.slip:  # a token too many stands between two nodes
-            wide, left = (0.24, x - 0.62) if cell.slip == SURPLUS else (0.92, x - 0.46)
-            frame = Rectangle((left, y - 0.46), wide, 0.92, zorder=3, **FRAMES[cell.slip])
-            axes.add_patch(frame)
-        if cell.slip == SURPLUS:
-            continue
-        blocked = cell.computed == BLOCKED
-        face, ink = (style.NEUTRAL, "white") if blocked else (str(shade), "black")
-        square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, edgecolor="white", lw=0.5)
-        axes.add_patch(square)
-        # the number, lifted where a wrong one stands below
-        wrong = cell.slip == WRONG
-        axes.text(x, y + 0.12 * wrong, cell.computed, color=ink, **NUMBER)
-        if wrong:
-            axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **SMALL)
-    axes.grid(visible=False)
-    axes.set(xlim=(-0.5, width - 0.3), ylim=(-0.5, count - 0.5), aspect="equal", title=title)
-    axes.set(xlabel="x [node]", xticks=range(0, width, 5))
-    axes.set(ylabel="y [node]", yticks=range(0, count, 5))
 
 
 def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:

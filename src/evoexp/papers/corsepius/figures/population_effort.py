@@ -1,4 +1,4 @@
-"""Success, expected effort and residual distance against one setting (Corsépius 2001, sec. 5)."""
+"""Searches against cycles, phase by phase, and success and effort against one setting (sec. 5)."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
@@ -8,16 +8,16 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter, NullLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.results.run_measures import solved
-from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
 from evoexp.report.statistics.comparisons import Values
-from evoexp.report.statistics.inference import Proportion
+from evoexp.report.statistics.inference import Proportion, quantiles
 
 SHARE, EFFORT, RATIO = "share", "effort", "ratio"
 NUMBERS = "abcdef"
@@ -25,6 +25,11 @@ APART = 0.035  # [-] of a value, by which neighbouring series are set apart on t
 NAMES = ["quantity", "kind", "position", "task", "value", "expected", "lower", "upper"]
 RESIDUAL, CYCLES, POINT = "residual", "cycles", "point"
 PROPORTIONAL: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.1, "linestyle": ":"}
+DISTANCE, COST = "distance to the goal", "cost"
+PER_LINE = 3  # panels
+MANY = 3  # conditions; more have panels of their own
+VISIBLE = 1e-6  # [length unit] smaller tolerances are not drawn
+TOLERANCE: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 
 
 def effort_table(
@@ -70,15 +75,16 @@ def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
 
 
 def ratios_table(
-    rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float
+    rows: Mapping[str, Sequence[Any]], found: tuple[Task, ...], reference: float
 ) -> pd.DataFrame:
     """Return the effort of every value over that of the recommended one."""
-    found = [
+    names = [task.name for task in found]
+    ratios = [
         (metric, RATIO, names.index(r.task), r.task, r.value, r.ratio, *r.interval, r.bound)
         for metric, own in rows.items()
         for r in own
     ]
-    return pd.DataFrame(found, columns=[*NAMES, "bound"]).assign(reference=reference)
+    return pd.DataFrame(ratios, columns=[*NAMES, "bound"]).assign(reference=reference)
 
 
 def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
@@ -159,7 +165,7 @@ def floor_table(found: Sequence[Task]) -> pd.DataFrame:
                 for value in measures.residuals(c)
             ]
     names = ["position", "task", "quantity", "scope", "median", "lower", "upper", "runs", "slope"]
-    unit = found[0].conditions[0].length_unit
+    unit = next(iter(found[0].by_value.values())).length_unit
     return pd.DataFrame(rows, columns=names).assign(length_unit=unit)
 
 
@@ -168,10 +174,12 @@ def slope(task: Task) -> float:
 
     It is NaN if there are fewer than two scopes.
     """
-    medians = np.array([inference.spread(measures.residuals(c)).median for c in task.conditions])
+    medians = np.array(
+        [inference.spread(measures.residuals(c)).median for c in task.by_value.values()]
+    )
     if len(medians) < 2 or not (medians > 0.0).all():
         return float("nan")
-    x, y = np.log2(np.array(task.values)), np.log2(medians)
+    x, y = np.log2(list(task.by_value)), np.log2(medians)
     x, y = x - x.mean(), y - y.mean()
     return float((x * y).sum() / (x * x).sum())
 
@@ -203,3 +211,85 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     right.set(ylabel="cycles until it stagnates [-]", title="b  cycles", ylim=(0, None))
     style.legend_below(figure, [left], 4)
     return figure
+
+
+def history_table(results: Results) -> pd.DataFrame:
+    """Return cost and distance of the best so far, per phase and cycle of the phase."""
+    parts = []
+    for position, c in enumerate(results.main):
+        names = measures.phase_names(c)
+        for phase, own in groups(c.generations, "term_phase"):
+            cycle = own.groupby("replicate")["index"].rank(method="first").astype(int) - 1
+            numbered = own.assign(cycle=cycle)
+            for quantity, column in ((DISTANCE, "term_goal_distance"), (COST, "term_cost")):
+                wide = numbered.pivot(index="cycle", columns="replicate", values=column)
+                values = wide.abs().ffill().to_numpy(dtype=np.float64)
+                quartiles = quantiles(values, (0.5, 0.25, 0.75))
+                columns: dict[str, Any] = {"position": position, "condition": c.label}
+                columns |= {"phase": names[int(phase) - 1], "order": int(phase) - len(names)}
+                columns |= {"quantity": quantity, "cycle": wide.index}
+                columns |= dict(zip(("median", "lower", "upper"), quartiles, strict=True))
+                columns |= {"begun": wide.shape[1], "running": wide.notna().sum(axis=1).to_numpy()}
+                columns |= {"tolerance": measures.tolerances(c)[int(phase) - 1]}
+                parts.append(pd.DataFrame(columns).assign(length_unit=c.length_unit))
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_history(table: pd.DataFrame) -> Figure:
+    """Draw medians with quartiles of the distance, one panel per phase.
+
+    If there is one phase alone, its cost is drawn beside it. If there are many conditions, each has
+    its own panel, with a line per phase.
+    """
+    conditions = sorted(set(zip(table["position"], table["condition"], strict=True)))
+    in_order = table.sort_values(["position", "order"], kind="stable")["phase"]
+    phases = sorted(dict.fromkeys(in_order), key=lambda name: not name.startswith("subgoal"))
+    by, names, height = "condition", [name for _, name in conditions], 2.4
+    if len(conditions) > MANY:
+        by, names, height = "phase", phases, 2.1
+        panels = [(table["position"] == k, name, DISTANCE) for k, name in conditions]
+    elif len(phases) == 1:
+        both = (("a", COST), ("b", DISTANCE))
+        panels = [(table["phase"] == phases[0], f"{k}  {name}", name) for k, name in both]
+    else:
+        numbered = enumerate(phases, 1)
+        panels = [(table["phase"] == name, f"{k}  {name}", DISTANCE) for k, name in numbered]
+    figure, places = style.panels(height, len(panels), PER_LINE, 0.8)
+    far = table.loc[table["quantity"] == DISTANCE, ["lower", "upper", "tolerance"]].to_numpy()
+    far = far[far > VISIBLE]
+    for axes, (chosen, title, quantity) in zip(places, panels, strict=True):
+        rows = table[chosen & (table["quantity"] == quantity)]
+        _draw_curves(axes, rows, by, names)
+        label = "cost of the best so far [-]"
+        if quantity == DISTANCE:  # distances on one scale
+            label = f"distance [{rows['length_unit'].iloc[0]}]"
+            if len(far):
+                axes.set_ylim(0.7 * far.min(), 1.4 * far.max())
+            for tolerance in sorted(set(rows["tolerance"][rows["tolerance"] >= VISIBLE])):
+                axes.axhline(tolerance, **TOLERANCE)
+        axes.set_title(title, fontsize=8)
+        axes.set(xlabel="cycle of the phase", ylabel=label)
+    colours = {name: style.condition_colour(k) for k, name in enumerate(names)}
+    keys = [style.key(name.replace("_", " "), color=c) for name, c in colours.items()]
+    if (table["tolerance"] >= VISIBLE).any():
+        keys.append(style.key("tolerance", **TOLERANCE))
+    style.keys_below(figure, keys, 4)
+    return figure
+
+
+def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> None:
+    """Draw one curve per condition or phase; numbers of runs at the ends, equal ones once."""
+    by_length = sorted(groups(table, by), key=lambda curve: int(curve[1]["cycle"].max()))
+    longest = {rows["begun"].iloc[0]: name for name, rows in by_length}
+    for name, curve in groups(table, by):
+        x, median = curve["cycle"], curve["median"]
+        colour = style.condition_colour(names.index(name))
+        marks.band(axes, x, curve["lower"], curve["upper"], colour, alpha=0.2)
+        axes.plot(x, median, color=colour)
+        begun = curve["begun"].iloc[0]
+        if longest[begun] == name:
+            at = x.iloc[-1], median.iloc[-1]
+            look: dict[str, Any] = {"color": colour, "fontsize": 6, "va": "center", "ha": "left"}
+            axes.annotate(f" {begun}", at, annotation_clip=False, **look)
+    axes.set(yscale="log", xlim=(0, max(1, int(table["cycle"].max()))))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))

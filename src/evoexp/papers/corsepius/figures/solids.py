@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from evoexp.papers import trails
-from evoexp.papers.corsepius import measures
+from evoexp.planners.posture_es.phases import Problem
 from evoexp.playback.shapes import outline
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, records, rounded, style, surfaces
@@ -76,7 +76,7 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
     """Return bodies and covers of robots at their start, of (title, a condition of the robot)."""
     rows: list[tuple[Any, ...]] = []
     for position, (title, c) in enumerate(shown):
-        problem = measures.problem(c)
+        problem = c.problem(Problem)
         bodies, model, geometry = problem.bodies, problem.assembly.model, problem.assembly.geometry
         data, placements = model.createData(), geometry.createData()
         pin.updateGeometryPlacements(model, data, geometry, placements, problem.start)

@@ -1,4 +1,4 @@
-"""Best costs of methods side by side (Curkovic et al. 2013, Fig. 6): curves, boxes of all runs."""
+"""Methods and settings side by side: curves, boxes of all runs (Curkovic et al. 2013, Fig. 6)."""
 
 from typing import Any
 
@@ -12,8 +12,9 @@ from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.claims import PAIRS
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.figures.effects import draw_box
-from evoexp.report.results.stored_results import Results
-from evoexp.report.statistics.inference import quantile
+from evoexp.report.results.run_measures import grouped
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import quantile, quantiles
 
 CURVE, FINAL, BOUND, THRESHOLD = "best so far", "final", "lower bound", "threshold"
 COST = "best C₂ + C₃ + C₄ of a team"
@@ -28,6 +29,8 @@ LINES: dict[str, dict[str, Any]] = {
     name: {"color": style.NEUTRAL, "linewidth": 1.0, "linestyle": kind, "zorder": 1}
     for name, kind in ((BOUND, (0, (1, 2))), (THRESHOLD, (0, (4, 2))))
 }
+MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own
+DIRECTIONS = {"one_sided": "Eq. 9 one-sided", "symmetric": "Eq. 9 symmetric"}
 
 
 def costs_table(results: Results, threshold: float) -> pd.DataFrame:
@@ -151,4 +154,89 @@ def draw_methods(table: pd.DataFrame) -> Figure:
         *(style.key(name, **look) for name, look in LINES.items()),
     ]
     style.keys_below(halves[1], keys, 4)
+    return figure
+
+
+def facets(results: Results) -> dict[str, dict[str, ConditionResults]]:
+    """Divide conditions by collision substeps and reading of Eq. 9; by rates if they are many.
+
+    Returns title of a panel (empty if there is one only) → its conditions by the parts of their
+    labels that differ within the panel.
+    """
+
+    def title(condition: ConditionResults) -> str:
+        return ", ".join(trait(condition) for trait in traits)
+
+    traits = [t for t in (_substeps, _direction) if len(set(map(t, results.with_data))) > 1]
+    found = grouped(results.with_data, title)
+    if max(map(len, found)) > MOST:
+        traits.append(_rate)
+        found = grouped(results.with_data, title)
+    divided = {}
+    for own in found:
+        parts = [c.label.split(", ") for c in own]
+        common = set(parts[0]).intersection(*parts[1:]) if len(parts) > 1 else set[str]()
+        names = [", ".join([p for p in one if p not in common] or one) for one in parts]
+        divided[title(own[0])] = dict(zip(names, own, strict=True))
+    return divided
+
+
+def _substeps(condition: ConditionResults) -> str:
+    substeps = condition.planner.collision.collision_substeps
+    return "configurations only" if substeps == 1 else f"{substeps} substeps"
+
+
+def _direction(condition: ConditionResults) -> str:
+    return DIRECTIONS[condition.planner.ga.mutation_direction]
+
+
+def _rate(condition: ConditionResults) -> str:
+    ga = condition.planner.ga
+    return "Eq. 10" if ga.mutation_decay else f"constant rate {ga.mutation_rate:g}"
+
+
+def facet_table(results: Results, threshold: float) -> pd.DataFrame:
+    """Return medians of the best cost so far, and shares of runs that have reached a cost."""
+    parts, names = [], dict[str, int]()
+    for panel, (title, conditions) in enumerate(facets(results).items()):
+        for name, c in conditions.items():
+            first = measures.generations_to(c, threshold)
+            averaged = ["evaluations", "best_cost"]
+            wide = c.generations.pivot(index="index", columns="replicate", values=averaged)
+            (spent,), (best,) = (
+                quantiles(wide[each].to_numpy(np.float64), (0.5,)) for each in averaged
+            )
+            index = wide.index.to_numpy(np.float64)
+            columns: dict[str, Any] = {"panel": panel, "title": title}
+            columns |= {"position": names.setdefault(name, len(names)), "name": name}
+            columns |= {"generation": index, "evaluations": spent, "median": best}
+            columns |= {"reached": (first <= index[:, None]).mean(axis=1)}
+            columns |= {"reaching": int(np.isfinite(first).sum()), "runs": c.done}
+            parts.append(pd.DataFrame(columns))
+    return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
+
+
+def draw_facets(table: pd.DataFrame, column: str) -> Figure:
+    """Draw a line per condition: medians of the best cost so far, or the share that got there."""
+    names = int(table.groupby("panel")["name"].nunique().max())
+    figure, panels = style.panels(2.4 + 0.09 * names, table["panel"].nunique(), 2)
+    is_share = column == "reached"
+    look: dict[str, Any] = {"drawstyle": "steps-post"} if is_share else {}
+    for axes, (_, rows) in zip(panels, groups(table.replace(np.inf, np.nan), "panel"), strict=True):
+        axes.sharex(panels[0])
+        axes.sharey(panels[0])
+        several = rows.groupby("generation")["evaluations"].nunique().max() > 1
+        across = "evaluations" if several else "generation"
+        for position, own in groups(rows, "position"):
+            name, reaching, runs = own[["name", "reaching", "runs"]].iloc[0]
+            name += f" ({reaching} of {runs})" * is_share
+            colour = style.condition_colour(int(position))
+            axes.plot(own[across], own[column], color=colour, label=name, **look)
+        if is_share:
+            axes.set(ylim=(-0.02, 1.02), ylabel="share of runs")
+        else:
+            axes.set_ylabel("best cost so far (median)")
+            axes.axhline(rows["threshold"].iloc[0], label="threshold", **LINES[THRESHOLD])
+        axes.set(xlabel=across, xlim=(0, rows[across].max()), title=rows["title"].iloc[0])
+        axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.2), ncols=2, fontsize=6.5)
     return figure

@@ -1,6 +1,5 @@
 """Motions of robots in their plane, drawn as trails (Curkovic et al. 2013, Figs. 8, 10 and 11)."""
 
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,11 +12,10 @@ from matplotlib.patches import Circle
 
 from evoexp.condition import Prepared
 from evoexp.papers import trails
-from evoexp.papers.curkovic import link_motions, measures
+from evoexp.papers.curkovic import measures
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
-from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
 POINTS = 20  # of an end-effector's path, per segment
@@ -33,11 +31,8 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
     The best one is the cheapest that the exact verdict does not refute, if there is one.
     """
     prepared, best = condition.prepared, measures.exemplar(condition)
-    outlines = motion_geometry.obstacle_outlines(obstacle_table(condition.scenario.obstacles))
     edges = [
-        (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
-        for k, outline in enumerate(outlines)
-        for a, b in itertools.pairwise(outline)
+        (OBSTACLE, -1, -1, k, 0.0, *ends, 0.0) for k, *ends in trails.obstacle_edges(condition)
     ]
     # the first contacts of bodies in the motions that the exact verdict refutes
     contacts = []
@@ -48,13 +43,11 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
     names = ["element", "replicate", *LINK]
     parts = [pd.DataFrame(edges, columns=names)]
     for replicate, solution in condition.solutions.items():
-        motion = link_motions.executed(prepared, solution)
-        parts.append(
-            _path(prepared, link_motions.sampled(motion, POINTS)).assign(replicate=replicate)
-        )
+        motion = measures.executed(prepared, solution)
+        parts.append(_path(prepared, measures.sampled(motion, POINTS)).assign(replicate=replicate))
         if replicate == best:
             parts += [
-                _links(prepared, link_motions.sampled(motion, samples)).assign(element=element)
+                _links(prepared, measures.sampled(motion, samples)).assign(element=element)
                 for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1))
             ]
     parts.append(pd.DataFrame(contacts, columns=names))
@@ -115,8 +108,8 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
     parts = []
     for position, c in enumerate(conditions):
         shown = measures.exemplar(c)
-        motion = link_motions.executed(c.prepared, c.solutions[shown])
-        path = _path(c.prepared, link_motions.sampled(motion, POINTS))
+        motion = measures.executed(c.prepared, c.solutions[shown])
+        path = _path(c.prepared, measures.sampled(motion, POINTS))
         model = c.planner.collision
         given = path.assign(
             condition=c.label,
@@ -162,7 +155,7 @@ def draw_tools(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _links(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFrame:
+def _links(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:
     """Return the links of all robots at every sample."""
     assembly = prepared.problem.assembly
     places = motion_geometry.joint_positions(assembly, sampled.q)
@@ -174,7 +167,7 @@ def _links(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFr
     return pd.DataFrame(rows, columns=LINK).assign(replicate=-1)
 
 
-def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFrame:
+def _path(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:
     """Return the path of each end-effector, one row from each sample to the next."""
     links = _links(prepared, sampled)
     tips = links[links["link"] == 1].drop(columns=["x", "y"])

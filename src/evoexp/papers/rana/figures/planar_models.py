@@ -10,7 +10,8 @@ from matplotlib.patches import Arc, Circle
 
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers import trails
-from evoexp.papers.rana import motions
+from evoexp.papers.rana import measures
+from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.results import motion_geometry
@@ -26,7 +27,7 @@ NUMBERED = 5  # every fifth via-point carries its number
 
 def arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and joint angles at start and goal."""
-    problem = motions.problem(condition)
+    problem = condition.problem(Problem)
     rows = []
     for posture, q in (("start", problem.start), ("goal", problem.goal)):
         for arm, joint, start, end in motion_geometry.joint_positions(problem.assembly, q[:, None]):
@@ -49,6 +50,7 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     }
     for (posture, arm), links in groups(table, ["posture", "arm"]):
         trails.draw_chain(axes, links, style.arm_colour(arm), **looks[posture])
+        trails.draw_base(axes, links)
     # joint angles with their reference directions, arcs and values
     for row in records(table[table["posture"] == "start"]):
         x, y, colour = row.x, row.y, style.arm_colour(row.arm)
@@ -65,7 +67,6 @@ def draw_arms(table: pd.DataFrame) -> Figure:
         look: dict[str, Any] = {"va": "center", "color": colour, "zorder": 6}
         axes.annotate(text, place, ha="left" if c >= 0 else "right", **look)
         if row.joint == 0:
-            marks.base(axes, x, y, 9, zorder=2)
             marks.write(axes, f"arm {row.arm + 1}", (x, y), (0, -22), color=colour)
     keys = [style.key(name, color=style.NEUTRAL, **look) for name, look in looks.items()]
     style.keys_below(figure, keys)
@@ -117,8 +118,8 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
 
 def circles_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and circles of the best replicate at its via-point of least centre distance."""
-    problem = motions.problem(condition)
-    q = motions.best_motion(condition)
+    problem = condition.problem(Problem)
+    q = measures.best_motion(condition)
     instant = int(np.argmin(problem.centre_distances(q)))
     at = q[:, instant]
     rows: list[tuple[object, ...]] = [
@@ -177,7 +178,7 @@ def draw_circles(table: pd.DataFrame) -> Figure:
 def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
     frames = []
-    shape = condition.planner.shape(motions.problem(condition))
+    shape = condition.planner.shape(condition.problem(Problem))
     parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shape])[:-1])
     for arm, (values, (rows, joints)) in enumerate(zip(parts, shape, strict=True)):
         angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")

@@ -1,6 +1,7 @@
 """Motions of planar arms: snapshots, paths in configuration space, distances between the arms."""
 
-import itertools
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,18 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
-from evoexp.papers.rana import motions
-from evoexp.papers.rana.figures.planar_models import ANGLES, path_table
-from evoexp.papers.rana.motions import STRAIGHT
+from evoexp.papers.rana import measures
+from evoexp.papers.rana.figures.planar_models import path_table
+from evoexp.papers.rana.measures import STRAIGHT, TO_OBSTACLES
+from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
-from evoexp.scenarios.obstacles import obstacle_table
 
+OTHERS = "replicate"
+MOST_PATHS = 200  # replicates whose paths are drawn, beside the best one; more hide each other
+WHITE: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "zorder": 5}
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
 BEST, AT_VIA_POINTS = "best replicate", "best replicate, at via-points"
@@ -32,10 +36,6 @@ LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are draw
     CLOSEST: {"color": style.NEUTRAL, "ls": "none", "marker": "D", "ms": 2.2, "alpha": 0.6},
     REFUTED: {"color": style.FORBIDDEN, "ls": "none", "marker": "X", "ms": 5, "mec": "white"},
 }
-COLUMNS = {  # of `sampled_distances`, by kind of pairs and measure
-    motions.ARMS: {CENTRES: "centres", LINKS: "links"},
-    motions.OBSTACLES: {CENTRES: "centres_to_obstacles", LINKS: "links_to_obstacles"},
-}
 Measure = motion_geometry.Measure
 TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
@@ -43,18 +43,13 @@ LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion."""
-    problem = motions.problem(condition)
-    links = motion_geometry.links_table(problem.assembly, motions.best_motion(condition))
+    problem = condition.problem(Problem)
+    links = motion_geometry.links_table(problem.assembly, measures.best_motion(condition))
     table = motion_geometry.in_stages(links.sort_values("instant", kind="stable"), STAGES)
     spans = sum((links[f"{name}_end"] - links[name]).abs() for name in "xyz")
-    obstacles = obstacle_table(condition.scenario.obstacles)
-    outlines = motion_geometry.obstacle_outlines(obstacles, 2.0 * float(np.max(spans)))
+    edges = trails.obstacle_edges(condition, 2.0 * float(np.max(spans)))
     last = int(links["instant"].max())
-    rows = [
-        (-1, 0, last, 0, -1, k, *a, *b)
-        for k, outline in enumerate(outlines)
-        for a, b in itertools.pairwise(outline)
-    ]
+    rows = [(-1, 0, last, 0, -1, *edge) for edge in edges]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     found = pd.concat([table[names], pd.DataFrame(rows, columns=names)]) if rows else table[names]
     return rounded(found.reset_index(drop=True)).assign(length_unit=condition.length_unit)
@@ -63,16 +58,15 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
 def draw_snapshots(table: pd.DataFrame) -> Figure:
     """Draw the motion stage by stage, older instants fainter, and all of it in the last panel."""
     obstacles, moving = table[table["stage"] < 0], table[table["stage"] >= 0]
-    stages, unit = list(groups(moving, "stage")), table["length_unit"].iloc[0]
+    stages = list(groups(moving, "stage"))
     names = "xyz" if "z" in table else "xy"
     if names == "xy":
         figure, panels = trails.planes(table, len(stages), 3)
     else:
         lines = -(-len(stages) // 3)
         figure = style.figure(2.1 * lines + 0.4)
-        ends = moving[[f"{name}{end}" for end in ("", "_end") for name in names]].to_numpy()
-        points, places = ends.reshape(-1, 3), range(1, len(stages) + 1)
-        panels = [trails.space(figure, (lines, 3, k), points, unit) for k in places]
+        places = ((lines, 3, k + 1) for k in range(len(stages)))
+        panels = [trails.space_of_links(figure, place, moving) for place in places]
     for axes, (stage, rows) in zip(panels, stages, strict=True):
         for _, outline in groups(obstacles, "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
@@ -87,94 +81,134 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
 
 def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line, in configuration space."""
-    return motions.paths_table(condition, path_table, "best")
+    return tables_of_paths(condition, path_table, "best")
 
 
-def draw_paths(table: pd.DataFrame) -> Figure:
-    """Draw the paths in the arms' configuration planes."""
-    return motions.draw_paths(table, ANGLES)
+def tables_of_paths(
+    condition: ConditionResults,
+    table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
+    best: str,
+) -> pd.DataFrame:
+    """Return one table of the replicates' solutions and of the straight line."""
+    solutions, best_replicate = condition.solutions, condition.best_replicate
+    shown = [k for n, k in enumerate(solutions) if n < MOST_PATHS or k == best_replicate]
+    others = OTHERS if len(shown) == len(solutions) else f"{OTHERS} of {len(solutions)}"
+    parts = [
+        table_of(condition, solutions[k]).assign(
+            series=best if k == best_replicate else others, replicate=k
+        )
+        for k in shown
+    ]
+    straight = table_of(condition, measures.straight_line(condition))
+    return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
 
 
-def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
+def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = False) -> Figure:
+    """Draw the paths of arms in the plane, or in space, of some columns; each arm in a panel.
+
+    Together they stand in one panel, which is that of the operational space.
+    """
+    arms, is_solid = list(groups(table, "arm")), len(columns) == 3
+    figure = style.figure(4.0, 5.6 if together else style.WIDTH)
+    for k, (arm, rows) in enumerate(arms):
+        colour = style.arm_colour(arm)
+        if k == 0 or not together:
+            place = (1, 1 if together else len(arms), k + 1)
+            axes: Any = figure.add_subplot(*place, projection="3d" if is_solid else None)
+        for (series, _), path in groups(rows, ["series", "replicate"]):
+            points = [path[name].to_numpy() for name in columns]
+            if series.startswith("best"):
+                axes.plot(*points, color=colour, linewidth=1.8, marker="o", ms=2.6, zorder=4)
+                axes.plot(*(p[:1] for p in points), "s", markersize=6.5, **WHITE)
+                axes.plot(*(p[-1:] for p in points), "*", markersize=10.5, **WHITE)
+            elif series == STRAIGHT:
+                axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
+            else:
+                axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
+        labels = [f"{style.joint_symbol(arm, joint)} [deg]" for joint in range(len(columns))]
+        if together:
+            labels = [f"{name} [{table['length_unit'].iloc[0]}]" for name in columns]
+        for name, label in zip("xyz", labels, strict=False):
+            getattr(axes, f"set_{name}label")(label, labelpad=-2 if is_solid else None)
+            getattr(axes, f"{name}axis").set_major_locator(style.few_ticks())
+        axes.set_title("" if together else f"arm {arm + 1}")
+        if is_solid:
+            axes.tick_params(labelsize=6, pad=-1)
+            axes.view_init(elev=24.0, azim=-50.0)
+            axes.set_box_aspect(None, zoom=0.85)
+        else:
+            axes.set_aspect("equal", adjustable="datalim")  # lengths are Euclidean in degrees
+    count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
+    some = [name for name in table["series"].unique() if name.startswith(f"{OTHERS} of ")]
+    shown = f"{count} of {some[0].split()[-1]} replicates" if some else ""
+    keys = [
+        *(trails.arm_keys(set(table["arm"])) if together else ()),
+        style.key("best replicate, its via-points", color=grey, linewidth=1.8, marker="o", ms=3),
+        style.key(shown or f"all replicates (n = {count})", color=grey, linewidth=0.8, alpha=0.4),
+        style.key(STRAIGHT, color=grey, linewidth=1.1, linestyle=":"),
+        style.key("start", marker="s", ms=6.5, color="none", mec=grey, mfc="white"),
+        style.key("goal", marker="*", ms=10.5, color="none", mec=grey, mfc="white"),
+    ]
+    style.keys_below(figure, keys, 4)
+    return figure
+
+
+def distances_table(condition: ConditionResults, samples: int) -> pd.DataFrame:
     """Return least distances along the best motion and the straight line, their range over all."""
-    measures = _measures(condition)
-
-    def sampled(solution: FloatArray) -> FloatArray:
-        q = motion_geometry.configurations(condition.prepared, solution)
-        return motion_geometry.dense(q, samples)[1]
-
-    # series → the configurations (nq, instants) [deg] at which each quantity is measured
-    series = {
-        STRAIGHT: [sampled(motions.straight_line(condition))] * len(measures),
-        BEST: [sampled(condition.solutions[condition.best_replicate])] * len(measures),
-    }
-    ranges = motion_geometry.extremes(
-        list(condition.solutions),
-        lambda replicate: sampled(condition.solutions[replicate]),
-        [quickly for _, quickly in measures.values()],
-    )
-    series[LOWEST] = [found.at_lowest for found in ranges]
-    series[HIGHEST] = [found.at_highest for found in ranges]
-    parts = []
-    for name, places in series.items():
-        columns: dict[str, Any] = {
-            "series": name,
-            "instant": np.arange(places[0].shape[1]) / samples,
-        }
-        for q, (column, (exactly, _)) in zip(places, measures.items(), strict=True):
-            columns[column] = exactly(q)
-        parts.append(pd.DataFrame(columns))
-    return rounded(pd.concat(parts, ignore_index=True))
-
-
-def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]:
-    """Return column → its exact measure, and one as good and quick, of q (nq, instants) [deg]."""
-    problem, kinds = motions.problem(condition), motions.kinds_of_pairs(condition)
-    scene, by_coal = problem.scene, {motions.ARMS: motion_geometry.link_distance(problem.assembly)}
-    if motions.OBSTACLES in kinds:
-        geometry = scene.geometry.copy()
-        geometry.removeAllCollisionPairs()
-        for one, two in scene.pairs[kinds[motions.OBSTACLES][0]]:
-            geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
-        by_coal[motions.OBSTACLES] = motion_geometry.BodyDistance(scene.model, geometry)
-    measures = dict[str, tuple[Measure, Measure]]()
-    for kind, bodies in by_coal.items():
-        own = problem.centre_distances if kind == motions.ARMS else problem.obstacle_distances
-        quick = motion_geometry.distance_measure(scene.of_pairs(kinds[kind][0]), bodies)
-        measures[COLUMNS[kind][CENTRES]] = (own, own)
-        measures[COLUMNS[kind][LINKS]] = (_in_radians(bodies), _in_radians(quick))
-    return measures
-
-
-def _in_radians(measure: Measure) -> Measure:
-    return lambda q: measure(DEGREE * q)
-
-
-def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
-    """Return the distances that Fig. 7 shows."""
-    found = {name: rows.set_index("instant") for name, rows in groups(sampled, "series")}
-    best = found[BEST]
-    found[AT_VIA_POINTS] = best[best.index == best.index.to_numpy().round()]
-    drawn = (BEST, AT_VIA_POINTS, LOWEST, HIGHEST, STRAIGHT)
-    exact, parts = motions.approaches(condition), []
-    for kind, (_, margin) in motions.kinds_of_pairs(condition).items():
+    solutions, exact, parts = condition.solutions, measures.approaches(condition), []
+    sampled = partial(measures.sampled, condition, samples=samples)
+    for kind, (pairs, margin) in measures.kinds_of_pairs(condition).items():
         own = exact[exact["kind"] == kind]
-        for measure, column in COLUMNS[kind].items():
-            series = {name: found[name][column] for name in drawn}
+        for measure, (exactly, quickly) in _measures(condition, kind, pairs).items():
+            (ranges,) = motion_geometry.extremes(
+                list(solutions), lambda replicate: sampled(solutions[replicate]), [quickly]
+            )
+            places = {
+                BEST: sampled(solutions[condition.best_replicate]),
+                LOWEST: ranges.at_lowest,
+                HIGHEST: ranges.at_highest,
+                STRAIGHT: sampled(measures.straight_line(condition)),
+            }
+            # series → its instants, and the distance at each
+            series = {
+                name: (np.arange(q.shape[1]) / samples, exactly(q)) for name, q in places.items()
+            }
+            instants, distances = series[BEST]
+            at_via_points = instants[::samples], distances[::samples]
+            series = {BEST: series[BEST], AT_VIA_POINTS: at_via_points, **series}
             if measure == LINKS:
-                free = own[own["refuted_at"].isna()].set_index("clearance_at")["clearance"]
-                touching = own[own["refuted_at"].notna()].set_index("refuted_at")["clearance"]
-                series |= {CLOSEST: free, REFUTED: touching}
-            for name, values in series.items():
-                columns: dict[str, Any] = {
-                    "measure": measure,
-                    "series": name,
-                    "instant": values.index,
-                }
-                rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
-                parts.append(rows.assign(kind=kind, safety_distance=margin))
+                for name, at_name in ((CLOSEST, "clearance_at"), (REFUTED, "refuted_at")):
+                    rows = own[own["refuted_at"].notna() == (name == REFUTED)]
+                    series[name] = rows[at_name].to_numpy(), rows["clearance"].to_numpy()
+            for name, (instants, distances) in series.items():
+                columns: dict[str, Any] = {"measure": measure, "series": name}
+                columns |= {"instant": instants, "distance": distances}
+                parts.append(pd.DataFrame(columns).assign(kind=kind, safety_distance=margin))
     table = rounded(pd.concat(parts, ignore_index=True))
     return table.assign(length_unit=condition.length_unit)
+
+
+def _measures(
+    condition: ConditionResults, kind: str, pairs: np.ndarray
+) -> dict[str, tuple[Measure, Measure]]:
+    """Return measure → the exact one, and one as good and quick, of q (nq, instants) [deg]."""
+    problem = condition.problem(Problem)
+    scene, bodies = problem.scene, motion_geometry.link_distance(problem.assembly)
+    centres = problem.centre_distances
+    if kind == TO_OBSTACLES:
+        geometry = scene.geometry.copy()
+        geometry.removeAllCollisionPairs()
+        for one, two in scene.pairs[pairs]:
+            geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
+        bodies = motion_geometry.BodyDistance(scene.model, geometry)
+        centres = problem.obstacle_distances
+    quick = motion_geometry.distance_measure(scene.of_pairs(pairs), bodies)
+    links = partial(_in_radians, bodies), partial(_in_radians, quick)
+    return {CENTRES: (centres, centres), LINKS: links}
+
+
+def _in_radians(measure: Measure, q: FloatArray) -> FloatArray:
+    return measure(DEGREE * q)
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:

@@ -8,26 +8,26 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from evoexp.papers import trails
-from evoexp.papers.rana import motions
+from evoexp.papers.rana import measures
+from evoexp.papers.rana.figures.planar_motion import STAGES, tables_of_paths
+from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style, surfaces
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
-STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
-BEST = "best replicate"
 
 
 def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion."""
-    table = motion_geometry.links_table(motions.problem(condition).assembly, q)
+    table = motion_geometry.links_table(condition.problem(Problem).assembly, q)
     return rounded(table).assign(length_unit=condition.length_unit)
 
 
 def arm_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and spheres of the first arm at its start."""
-    problem = motions.problem(condition)
+    problem = condition.problem(Problem)
     links = links_table(condition, problem.start[:, None])
     spheres = problem.sphere_centres(problem.start)[0]
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
@@ -45,7 +45,7 @@ def draw_arm(table: pd.DataFrame) -> Figure:
     for k, title in enumerate(
         ("a  touching spheres of the collision model", "b  line segments: the links themselves")
     ):
-        axes = _space(figure, (1, 2, k + 1), table)
+        axes = trails.space_of_links(figure, (1, 2, k + 1), table)
         axes.set_title(title)
         trails.draw_chain(axes, links, colour, "xyz")
         trails.draw_base(axes, links, "xyz")
@@ -60,23 +60,19 @@ def draw_arm(table: pd.DataFrame) -> Figure:
 
 def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links at start (instant 0) and goal (1), and each arm's reach from its shoulder on."""
-    problem = motions.problem(condition)
+    problem = condition.problem(Problem)
     table = links_table(condition, np.column_stack([problem.start, problem.goal]))
-    lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))
-    links = problem.assembly.links
-    arms = [link.arm for link in links]
-    first = np.array([arms.index(arm) for arm in range(problem.assembly.num_arms)])  # links of arms
-    moving = np.array([link.joint > 0 for link in links])
-    own = moving[table["link"].to_numpy() + first[table["arm"].to_numpy()]]
-    counted = table.assign(reach=np.where(own, lengths, 0.0))
-    reach = counted[counted["instant"] == 0].groupby("arm")["reach"].sum()
+    starts = table[table["instant"] == 0]  # link by link
+    lengths = np.sqrt(sum((starts[f"{axis}_end"] - starts[axis]) ** 2 for axis in "xyz"))
+    moving = np.array([link.joint > 0 for link in problem.assembly.links])
+    reach = lengths[moving].groupby(starts["arm"]).sum()
     return table.assign(reach=table["arm"].map(reach).round(9))
 
 
 def draw_two_arms(table: pd.DataFrame) -> Figure:
     """Draw the arms at start and goal, and from above the part of the workspace they share."""
     figure = style.figure(4.3)
-    axes = _space(figure, (1, 2, 1), table)
+    axes = trails.space_of_links(figure, (1, 2, 1), table)
     axes.set_title("a  start (full) and goal (dashed)")
     above = figure.add_subplot(1, 2, 2)
     above.set_title("b  from above, with each arm's reach")
@@ -99,14 +95,8 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
 
 def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion, stage by stage."""
-    links = links_table(condition, motions.best_motion(condition))
+    links = links_table(condition, measures.best_motion(condition))
     return motion_geometry.in_stages(links, STAGES)
-
-
-def _space(figure: Figure, place: tuple[int, int, int], table: pd.DataFrame) -> Any:
-    """Return axes in space that hold all links of a table."""
-    ends = table[["x", "y", "z", "x_end", "y_end", "z_end"]].to_numpy().reshape(-1, 3)
-    return trails.space(figure, place, ends, table["length_unit"].iloc[0])
 
 
 def _name_points(axes: Any, arm: int, links: pd.DataFrame) -> None:
@@ -121,23 +111,13 @@ def _name_points(axes: Any, arm: int, links: pd.DataFrame) -> None:
 
 def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line in both spaces."""
-    table = rounded(motions.paths_table(condition, _path, BEST))
+    table = rounded(tables_of_paths(condition, _path, "best replicate"))
     return table.assign(length_unit=condition.length_unit)
-
-
-def draw_configuration_space(table: pd.DataFrame) -> Figure:
-    """Draw the paths through the first three joint angles of every arm."""
-    return motions.draw_paths(table, [f"joint_{j}_deg" for j in (1, 2, 3)])
-
-
-def draw_operational_space(table: pd.DataFrame) -> Figure:
-    """Draw the paths of the tips of all arms."""
-    return motions.draw_paths(table, ["x", "y", "z"], together=True)
 
 
 def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return one solution's joint angles and tips."""
-    problem = motions.problem(condition)
+    problem = condition.problem(Problem)
     q = motion_geometry.configurations(condition.prepared, solution)
     places = motion_geometry.joint_positions(problem.assembly, q)
     tips = {arm: end for arm, _, _, end in places}  # the last link's end stays

@@ -97,7 +97,7 @@ class Assembly(NamedTuple):
     def joint_names(self) -> tuple[str, ...]:
         """(nq) names of the joints that move, in the order of q."""
         own = np.flatnonzero(self.table.free)
-        own = own[np.argsort(self.table.index_q[own])]
+        own = own[np.argsort(self.table.chain.index_q[own])]
         return tuple(str(self.model.names[k + 1]) for k in own.tolist())
 
 

@@ -44,13 +44,7 @@ class KinematicChain(NamedTuple):
 class KinematicTable(NamedTuple):
     """Joints in the order of the model, without the universe; parents before their children."""
 
-    parent: IntArray  # the first seven are those of `KinematicChain`
-    index_q: IntArray
-    prismatic: BoolArray
-    turned: BoolArray
-    rotation: FloatArray
-    translation: FloatArray
-    rule: FloatArray
+    chain: KinematicChain
     # (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the table's axes
     alignment: FloatArray
     # whether every joint turns about the world's z, so that everything moves in parallel planes;
@@ -64,15 +58,10 @@ class KinematicTable(NamedTuple):
         return int(self.free.sum())
 
     @property
-    def chain(self) -> KinematicChain:
-        """The seven arrays that kernels read."""
-        return KinematicChain(*self[:7])
-
-    @property
     def slides(self) -> BoolArray:
         """(nq,) whether a coordinate is a length, that of a joint that slides."""
         slides = np.zeros(self.num_coordinates, dtype=np.bool_)
-        slides[self.index_q[self.free]] = self.prismatic[self.free]
+        slides[self.chain.index_q[self.free]] = self.chain.prismatic[self.free]
         return slides
 
     def local(self, joint: int, point: FloatArray) -> FloatArray:
@@ -115,9 +104,8 @@ def kinematic_table(model: Any) -> KinematicTable:
     rows, z = rotation.reshape(-1, 3, 3), np.array([0.0, 0.0, 1.0])
     is_flat = (rows[:, 2] == z).all() and (rows[:, :, 2] == z).all()
     planar = bool(free.all() and not prismatic.any() and is_flat)
-    return KinematicTable(
-        parent, index_q, prismatic, turned, rotation, translation, rule, alignment, planar, free
-    )
+    chain = KinematicChain(parent, index_q, prismatic, turned, rotation, translation, rule)
+    return KinematicTable(chain, alignment, planar, free)
 
 
 def check_size(model: Any) -> None:

@@ -22,10 +22,10 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.scenarios.moveit_files import IDENTITY, MessagePart, Pose, primitive_kind
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
-    CylinderObstacle,
     HalfSpaceObstacle,
     HullObstacle,
     Obstacle,
+    RodObstacle,
     SphereObstacle,
 )
 from evoexp.validation import Settings
@@ -272,7 +272,7 @@ def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
     along = 0.5 * float(sizes[0]) * pose.rotation[:, 2]
     ends = _three(pose.position - along), _three(pose.position + along)
     radius = float(sizes[1])
-    return CylinderObstacle(shape="cylinder", name=name, start=ends[0], end=ends[1], radius=radius)
+    return RodObstacle(shape="cylinder", name=name, start=ends[0], end=ends[1], radius=radius)
 
 
 def _plane(plane: MessagePart, pose: Pose, name: str) -> Obstacle:

@@ -7,25 +7,27 @@ identity.
 
 import contextlib
 from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, file_content, keep, located
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.robots.assembly import AppendArm, Assembly, Chain, assembled
 from evoexp.robots.bodies import Point3
 from evoexp.robots.joint_choice import urdf_notes
 from evoexp.robots.mesh_checks import whole_mesh
 from evoexp.robots.mesh_pieces import Decomposition, mesh_pieces
-from evoexp.robots.robot_data import robot_file
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfTree
 from evoexp.robots.urdf_model import given_spheres
 from evoexp.robots.urdf_reading import UrdfFile, parsed_xml, read_urdf, urdf_file
 from evoexp.validation import Positive, Settings
+
+ROBOT_DATA = "example-robot-data"  # names of its files begin with this and a colon
 
 
 class Mesh(Settings):
@@ -50,6 +52,25 @@ def _named(file: Any) -> Iterator[None]:
     except SettingError as error:
         hint = f"{error.hint}; in {file}"
         raise SettingError(error.field, error.must, error.was, hint) from None
+
+
+def robot_file(path: Any, field: str) -> Any:
+    """Find a file of the package, if a path begins with `example-robot-data:`."""
+    if not isinstance(path, str) or not path.startswith(f"{ROBOT_DATA}:"):
+        return path
+    try:
+        package = distribution(ROBOT_DATA)
+    except PackageNotFoundError:
+        must = f"a file that is there; install {ROBOT_DATA}: pip install 'evoexp[robots]'"
+        raise SettingError(field, must, path) from None
+    folder = Path(str(package.locate_file(f"cmeel.prefix/share/{ROBOT_DATA}/robots")))
+    found = folder / path.removeprefix(f"{ROBOT_DATA}:")
+    if ".." not in found.parts and found.is_file():
+        return str(found)
+    ending = found.suffix.lower()
+    names = [str(each.relative_to(folder)) for each in sorted(folder.rglob(f"*{ending}"))]
+    hint = nearest(path.removeprefix(f"{ROBOT_DATA}:"), names) if ending else ""
+    raise SettingError(field, f"a file of {ROBOT_DATA}", path, hint)
 
 
 class Urdf(Chain):

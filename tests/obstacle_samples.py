@@ -2,10 +2,9 @@
 
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
-    CapsuleObstacle,
-    CylinderObstacle,
     EllipseObstacle,
     HalfSpaceObstacle,
+    RodObstacle,
     SphereObstacle,
 )
 
@@ -20,12 +19,12 @@ def box(center: Point, size: Point, rotation: Point = (0.0, 0.0, 0.0)) -> BoxObs
     return BoxObstacle(shape="box", center=center, size=size, rotation=rotation)
 
 
-def capsule(start: Point, end: Point, radius: float) -> CapsuleObstacle:
-    return CapsuleObstacle(shape="capsule", start=start, end=end, radius=radius)
+def capsule(start: Point, end: Point, radius: float) -> RodObstacle:
+    return RodObstacle(shape="capsule", start=start, end=end, radius=radius)
 
 
-def cylinder(start: Point, end: Point, radius: float) -> CylinderObstacle:
-    return CylinderObstacle(shape="cylinder", start=start, end=end, radius=radius)
+def cylinder(start: Point, end: Point, radius: float) -> RodObstacle:
+    return RodObstacle(shape="cylinder", start=start, end=end, radius=radius)
 
 
 def half_space(point: Point, normal: Point) -> HalfSpaceObstacle:

@@ -17,7 +17,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray, ReplicateSummary
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import frame_pose, local_pose
-from evoexp.robots.robot_data import ROBOT_DATA
+from evoexp.robots.urdf import ROBOT_DATA
 from evoexp.testing import conditions
 
 TRIES = 60  # random configurations, of which one must be free

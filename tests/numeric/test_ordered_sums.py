@@ -27,7 +27,8 @@ for k in range(40):
     turn = pin.Quaternion(*rng.normal(size=4)).normalized().toRotationMatrix()
     model.addJoint(k, joint, pin.SE3(turn, rng.normal(size=3)), f"joint_{k}")
 table = kinematic_table(model)
-sys.stdout.write(b"".join(a.tobytes() for a in table if isinstance(a, np.ndarray)).hex())
+arrays = (*table.chain, table.alignment, table.free)
+sys.stdout.write(b"".join(array.tobytes() for array in arrays).hex())
 """
 
 

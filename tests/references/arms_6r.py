@@ -10,9 +10,8 @@ from evoexp.collision.bodies.packing import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
-    CapsuleObstacle,
-    CylinderObstacle,
     HalfSpaceObstacle,
+    RodObstacle,
     SphereObstacle,
     rotation_matrix,
 )
@@ -30,8 +29,8 @@ def ball(*center: float, radius: float) -> SphereObstacle:
     return SphereObstacle(shape="sphere", center=center, radius=radius)
 
 
-def rod(kind: Any, start: tuple[float, ...], end: tuple[float, ...], radius: float) -> Any:
-    return kind(shape=kind.__name__[:-8].lower(), start=start, end=end, radius=radius)
+def rod(shape: Any, start: tuple[float, ...], end: tuple[float, ...], radius: float) -> RodObstacle:
+    return RodObstacle(shape=shape, start=start, end=end, radius=radius)
 
 
 OBSTACLES = (
@@ -39,12 +38,12 @@ OBSTACLES = (
     box(0.75, 0.1, 0.25, size=(0.5, 0.9, 0.06), rotation=(3.0, -4.0, 20.0)),
     box(-0.45, 0.75, 0.55, size=(0.25, 0.3, 0.5), rotation=(15.0, 10.0, -30.0)),
     box(0.35, -0.85, 0.9, size=(0.3, 0.12, 0.4), rotation=(40.0, 25.0, 60.0)),
-    rod(CylinderObstacle, (-0.75, -0.35, 0.0), (-0.7, -0.3, 1.1), 0.08),
-    rod(CylinderObstacle, (0.7, -0.45, 0.5), (0.9, -0.35, 0.75), 0.12),
+    rod("cylinder", (-0.75, -0.35, 0.0), (-0.7, -0.3, 1.1), 0.08),
+    rod("cylinder", (0.7, -0.45, 0.5), (0.9, -0.35, 0.75), 0.12),
     ball(0.6, 0.65, 0.95, radius=0.15),
     ball(-0.6, 0.05, 1.25, radius=0.12),
-    rod(CapsuleObstacle, (-0.3, 0.9, 1.2), (0.4, 0.85, 1.35), 0.05),
-    rod(CapsuleObstacle, (-0.2, -0.8, 0.3), (-0.4, -0.7, 0.8), 0.07),
+    rod("capsule", (-0.3, 0.9, 1.2), (0.4, 0.85, 1.35), 0.05),
+    rod("capsule", (-0.2, -0.8, 0.3), (-0.4, -0.7, 0.8), 0.07),
 )
 
 # joint, start, end, radius [m], spheres along it: 11 capsules, 59 spheres
@@ -133,7 +132,7 @@ def coal_obstacle(obstacle: Any) -> tuple[Any, Any]:
             along(point(obstacle.normal)), point(obstacle.point)
         )
     start, end = point(obstacle.start), point(obstacle.end)
-    if isinstance(obstacle, CapsuleObstacle):
+    if obstacle.shape == "capsule":
         return capsule(start, end, obstacle.radius)
     length = float(np.linalg.norm(end - start))
     return coal.Cylinder(obstacle.radius, length), pin.SE3(along(end - start), 0.5 * (start + end))

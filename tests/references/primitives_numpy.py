@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import KinematicTable
+from evoexp.robots.kinematics import KinematicChain
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, SPHERE, ObstacleTable
 
 
 def sphere_centers(
-    table: KinematicTable,  # of revolute joints
+    table: KinematicChain,  # of revolute joints
     joint: np.ndarray,  # (spheres,) index into the table
     local: FloatArray,  # (spheres, 3) in the table's frames
     q: FloatArray,  # (nq, configurations) [rad]

@@ -96,9 +96,9 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
     bodies = (
         obstacles.SphereObstacle(shape="sphere", center=(5.2, 4.0), radius=0.4),
         obstacles.BoxObstacle(shape="box", center=(-5.5, 4.0), **turned),
-        obstacles.CapsuleObstacle(shape="capsule", **ends, radius=0.2),
-        obstacles.CylinderObstacle(shape="cylinder", **upright, radius=0.3),
-        obstacles.CylinderObstacle(shape="cylinder", **ends, radius=0.3),
+        obstacles.RodObstacle(shape="capsule", **ends, radius=0.2),
+        obstacles.RodObstacle(shape="cylinder", **upright, radius=0.3),
+        obstacles.RodObstacle(shape="cylinder", **ends, radius=0.3),
         obstacles.HalfSpaceObstacle(shape="half_space", point=(0.0, -2.0), normal=(0.0, 1.0)),
         obstacles.EllipseObstacle(
             shape="ellipse", center=(1.0, 2.0), semi_axes=(3.0, 0.5), angle=60.0

@@ -64,7 +64,7 @@ def tool_pose(robot: Assembly, q: FloatArray) -> FloatArray:
 
 def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotations (joints, 3, 3, configurations) and origins (joints, 3, configurations)."""
-    poses, q = np.empty((len(table.parent), 12, q.shape[1])), np.ascontiguousarray(q)
+    poses, q = np.empty((len(table.chain.parent), 12, q.shape[1])), np.ascontiguousarray(q)
     for joint, own in enumerate(poses):
         frame_poses(table.chain, joint, IDENTITY, q, own)
     return poses[:, :9].reshape(len(poses), 3, 3, -1), poses[:, 9:]

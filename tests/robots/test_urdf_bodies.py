@@ -19,8 +19,7 @@ from evoexp.attachments import File, keep, located
 from evoexp.errors import EvoexpError, SettingError
 from evoexp.mesh_files import mesh_content
 from evoexp.records import FloatArray
-from evoexp.robots.robot_data import ROBOT_DATA, robot_file
-from evoexp.robots.urdf import Urdf
+from evoexp.robots.urdf import ROBOT_DATA, Urdf, robot_file
 from evoexp.robots.urdf_model import urdf_model
 from robot_gallery import POSTURES, ROBOTS, GalleryRobot, planned_reach
 from robots.robot_samples import placements, urdf
@@ -240,7 +239,7 @@ def test_a_name_of_the_package_is_refused_without_it(monkeypatch: pytest.MonkeyP
     def missing(name: str) -> None:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("evoexp.robots.robot_data.distribution", missing)
+    monkeypatch.setattr("evoexp.robots.urdf.distribution", missing)
     with pytest.raises(EvoexpError, match=r"pip install 'evoexp\[robots\]'"):
         Urdf.read_files({"path": f"{ROBOT_DATA}:ur5.urdf"}, "robot")
 

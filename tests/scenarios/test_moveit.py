@@ -13,8 +13,7 @@ from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
 from evoexp.scenarios.moveit import MoveitTask, read_link_goal, read_request
 from evoexp.scenarios.moveit_files import REQUEST
-from evoexp.scenarios.moveit_frames import read_frames
-from evoexp.scenarios.moveit_scene import read_allowed, read_state
+from evoexp.scenarios.moveit_scene import read_allowed, read_frames, read_state
 from evoexp.scenarios.obstacles import BOX, obstacle_table
 from moveit_samples import (
     GOAL,

@@ -84,7 +84,7 @@ def distance_map(assembly: Assembly, pair: Pair) -> DistanceMap | None:
         return None
     coordinates = np.array([moving[0], moving[-1]])
     low, high = joint_limits(assembly)[:, coordinates] + np.array([[-BEYOND], [BEYOND]])
-    turns = ~np.isin(coordinates, assembly.table.index_q[assembly.table.prismatic])
+    turns = ~np.isin(coordinates, assembly.table.chain.index_q[assembly.table.chain.prismatic])
     span = np.where(turns, np.minimum(high - low, TURN), high - low)
     shape = np.array([FINE, FINE if len(moving) == 2 else 1])
     items = [assembly.geometry.geometryObjects[body] for body in pair]
@@ -126,12 +126,12 @@ def _bounds(
 def approach_speeds(assembly: Assembly, pair: Pair) -> FloatArray:
     """Return bounds of |d distance / dq| of two bodies, (nq,); 0 of joints not between them."""
     items, table = list(assembly.geometry.geometryObjects), assembly.table
-    bodies = body_table(table, [items[body] for body in pair])
+    bodies, chain = body_table(table, [items[body] for body in pair]), table.chain
     strokes = np.abs(joint_limits(assembly)).max(axis=0)
-    reach = reaches(table.chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
+    reach = reaches(chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
     way = pair_reaches(np.array([[0, 1]], dtype=np.int64), reach)[0]  # (joints,)
     # joints that follow others share their coordinates
-    way = np.bincount(table.index_q, way * np.abs(table.rule[:, 0]), table.num_coordinates)
+    way = np.bincount(chain.index_q, way * np.abs(chain.rule[:, 0]), table.num_coordinates)
     return np.asarray(way, dtype=np.float64)
 
 

@@ -97,17 +97,8 @@ class Assembly(NamedTuple):
     def joint_names(self) -> tuple[str, ...]:
         """(nq) names of the joints that move, in the order of q."""
         own = np.flatnonzero(self.table.free)
-        own = own[np.argsort(self.table.index_q[own])]
+        own = own[np.argsort(self.table.chain.index_q[own])]
         return tuple(str(self.model.names[k + 1]) for k in own.tolist())
-
-
-class Follower(NamedTuple):
-    """A joint that follows another: its coordinate is multiplier · q of the source + offset."""
-
-    joint: int  # index of the Pinocchio joint
-    source: int
-    multiplier: float
-    offset: float  # [rad], a length for a prismatic joint
 
 
 class ArmParts(NamedTuple):
@@ -117,7 +108,9 @@ class ArmParts(NamedTuple):
     bodies: list[Any] | None = None  # each a pin.GeometryObject; None: the links, as capsules
     tool: Tool | None = None  # its frame; None: at the end of the last link, turned as its joint
     disabled: frozenset[frozenset[str]] = frozenset()  # pairs of bodies that are never judged
-    followers: tuple[Follower, ...] = ()  # the joints that follow others
+    # the joints that follow others: indices of the source's Pinocchio joint and of the own, then
+    # multiplier and offset: q = multiplier · q of the source + offset [rad, m]
+    followers: tuple[tuple[int, int, float, float], ...] = ()
     states: ArmStates = ArmStates((), (), {})  # those that a file names
     has_names: bool = False  # whether a file names joints and bodies, which keep these names
 
@@ -190,9 +183,7 @@ def assembled(arms: tuple[AppendArm, ...]) -> Assembly:
         tools.append(part.tool or Tool(part.links[-1].joint, np.eye(3), part.links[-1].end))
         disabled |= {frozenset(prefix + name for name in pair) for pair in part.disabled}
     for follower in (follower for part in parts for follower in part.followers):
-        model = pin.transformJointIntoMimic(
-            model, follower.source, follower.joint, follower.multiplier, follower.offset
-        )
+        model = pin.transformJointIntoMimic(model, *follower)
     # joints that follow have no coordinates
     ends = np.cumsum([0] + [sum(model.nqs[first:last]) for first, last in slices])
     return Assembly(

@@ -39,38 +39,31 @@ class BoxBody(Body):
     size: tuple[Positive, Positive, Positive]
 
 
-class CapsuleBody(Body):
-    """All points within `radius` of the segment from `start` to `end`."""
+class RodBody(Body):
+    """A segment from `start` to `end`, thickened.
 
-    shape: Literal["capsule"]
+    A capsule is all points within `radius` of it, a cylinder has flat ends.
+    """
+
+    shape: Literal["capsule", "cylinder"]
     start: Point3
     end: Point3
     radius: Positive
 
 
-class CylinderBody(Body):
-    """A solid cylinder with flat ends, its axis from `start` to `end`."""
-
-    shape: Literal["cylinder"]
-    start: Point3
-    end: Point3
-    radius: Positive
+AnyBody = Annotated[SphereBody | BoxBody | RodBody, Field(discriminator="shape")]
 
 
-AnyBody = Annotated[SphereBody | BoxBody | CapsuleBody | CylinderBody, Field(discriminator="shape")]
-
-
-def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
+def body_geometry(body: AnyBody, field: str) -> tuple[Any, Any]:
     """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`."""
     if isinstance(body, SphereBody | BoxBody):
         shape = coal.Sphere(body.radius) if isinstance(body, SphereBody) else coal.Box(*body.size)
         return shape, pin.SE3(np.eye(3), np.array(body.center))
-    assert isinstance(body, CapsuleBody | CylinderBody)
     start, end = np.array(body.start), np.array(body.end)
     reach = length(end - start)
     if reach == 0.0:
         raise SettingError(f"{field}.end", "another point than start", list(body.end))
-    kind = coal.Capsule if isinstance(body, CapsuleBody) else coal.Cylinder
+    kind = coal.Capsule if body.shape == "capsule" else coal.Cylinder
     return kind(body.radius, reach), along(start, end)
 
 

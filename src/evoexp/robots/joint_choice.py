@@ -1,13 +1,15 @@
 """Which joints of a URDF move, in which arm, where the others stand, and what is left open."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from evoexp.errors import SettingError, nearest
 from evoexp.robots.mesh_checks import unit_of
 from evoexp.robots.urdf_model import BASE, coordinate_names
-from evoexp.robots.urdf_reading import Mimic, UrdfJoint
-from evoexp.robots.urdf_settings import PATH, UrdfSettings
+from evoexp.robots.urdf_reading import PATH, Mimic, UrdfJoint
+
+if TYPE_CHECKING:
+    from evoexp.robots.urdf import Urdf
 
 LIMIT_SETTINGS = {"revolute": ("turn_limit", "deg"), "prismatic": ("slide_limit", "m")}
 
@@ -28,7 +30,7 @@ class JointRoles(NamedTuple):
         return frozenset[str]().union(*self.arms)
 
 
-def joint_roles(robot: UrdfSettings) -> JointRoles:
+def joint_roles(robot: "Urdf") -> JointRoles:
     """Choose the joints that move: those named, those of groups, or all."""
     joints, srdf, base = robot.file.joints, robot.semantics, robot.base
     free = {
@@ -73,7 +75,7 @@ def joint_roles(robot: UrdfSettings) -> JointRoles:
     return JointRoles(tuple(map(frozenset, arms)), rules, _tool_frames(robot, tips))
 
 
-def _tool_frames(robot: UrdfSettings, tips: list[str]) -> tuple[tuple[str, str], ...]:
+def _tool_frames(robot: "Urdf", tips: list[str]) -> tuple[tuple[str, str], ...]:
     """Return the frame of each arm's tool, the tip of its group if none is named, and the field."""
     if robot.tool_frame and robot.groups:
         raise SettingError("robot.tool_frame", "left out beside robot.groups", robot.tool_frame)
@@ -108,7 +110,7 @@ def _whole_rule(rule: Mimic, joints: dict[str, UrdfJoint]) -> Mimic:
     return rule
 
 
-def standing_values(robot: UrdfSettings, roles: JointRoles) -> dict[str, float]:
+def standing_values(robot: "Urdf", roles: JointRoles) -> dict[str, float]:
     """Return the values [deg, m] that are given to joints that stand still."""
     for joint, setting, _ in _limited_joints(robot, roles):
         if joint.limits != (None, None) and not any(joint.limits):
@@ -133,7 +135,7 @@ def standing_values(robot: UrdfSettings, roles: JointRoles) -> dict[str, float]:
     return dict(robot.fixed)
 
 
-def urdf_notes(robot: UrdfSettings) -> Iterator[str]:
+def urdf_notes(robot: "Urdf") -> Iterator[str]:
     """Yield a remark on each of the things that a URDF leaves open: bodies, limits, units."""
     file, roles = robot.file, joint_roles(robot)
     above, bare = {joint.child: joint for joint in file.joints.values()}, []
@@ -162,7 +164,7 @@ def urdf_notes(robot: UrdfSettings) -> Iterator[str]:
             )
 
 
-def _limited_joints(robot: UrdfSettings, roles: JointRoles) -> Iterator[tuple[UrdfJoint, str, str]]:
+def _limited_joints(robot: "Urdf", roles: JointRoles) -> Iterator[tuple[UrdfJoint, str, str]]:
     """Yield the joints between limits that move of their own, with the setting without them."""
     for joint in robot.file.joints.values():
         if joint.kind in LIMIT_SETTINGS and joint.name in roles.moving:

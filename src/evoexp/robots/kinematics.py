@@ -44,13 +44,7 @@ class KinematicChain(NamedTuple):
 class KinematicTable(NamedTuple):
     """Joints in the order of the model, without the universe; parents before their children."""
 
-    parent: IntArray  # the first seven are those of `KinematicChain`
-    index_q: IntArray
-    prismatic: BoolArray
-    turned: BoolArray
-    rotation: FloatArray
-    translation: FloatArray
-    rule: FloatArray
+    chain: KinematicChain
     # (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the table's axes
     alignment: FloatArray
     # whether every joint turns about the world's z, so that everything moves in parallel planes;
@@ -64,15 +58,10 @@ class KinematicTable(NamedTuple):
         return int(self.free.sum())
 
     @property
-    def chain(self) -> KinematicChain:
-        """The seven arrays that kernels read."""
-        return KinematicChain(*self[:7])
-
-    @property
     def slides(self) -> BoolArray:
         """(nq,) whether a coordinate is a length, that of a joint that slides."""
         slides = np.zeros(self.num_coordinates, dtype=np.bool_)
-        slides[self.index_q[self.free]] = self.prismatic[self.free]
+        slides[self.chain.index_q[self.free]] = self.chain.prismatic[self.free]
         return slides
 
     def local(self, joint: int, point: FloatArray) -> FloatArray:
@@ -94,15 +83,17 @@ def kinematic_table(model: Any) -> KinematicTable:
     count = model.njoints - 1
     parent = np.array(list(model.parents)[1:], dtype=np.int64) - 1
     index_q = np.array(list(model.idx_qs)[1:], dtype=np.int64)
-    rules = [_followed_rule(model, joint) for joint in range(1, model.njoints)]
-    free = np.array([own is None for own in rules], dtype=np.bool_)
-    rule = np.array([own or (1.0, 0.0) for own in rules]).reshape(-1, 2)
+    joints = list(model.joints)[1:]
+    free = np.array([joint.shortname() != "JointModelMimic" for joint in joints], dtype=np.bool_)
+    rule = np.tile([1.0, 0.0], (count, 1))
     alignment, prismatic = np.empty((count, 3, 3)), np.zeros(count, dtype=np.bool_)
     rotation, translation = np.empty((count, 9)), np.empty((count, 3))
     for k in range(count):
         if free[k]:
             axis, prismatic[k] = _free_axis(model, data, k + 1)
         else:  # Pinocchio's motion subspace of such a joint is its own times the multiplier
+            mimic = joints[k].extract()
+            rule[k] = mimic.scaling, mimic.offset
             axis, prismatic[k] = own_axis(model, k + 1)
             axis = axis / rule[k, 0]
         alignment[k] = _frame_with_z(axis)
@@ -115,23 +106,14 @@ def kinematic_table(model: Any) -> KinematicTable:
     rows, z = rotation.reshape(-1, 3, 3), np.array([0.0, 0.0, 1.0])
     is_flat = (rows[:, 2] == z).all() and (rows[:, :, 2] == z).all()
     planar = bool(free.all() and not prismatic.any() and is_flat)
-    return KinematicTable(
-        parent, index_q, prismatic, turned, rotation, translation, rule, alignment, planar, free
-    )
+    chain = KinematicChain(parent, index_q, prismatic, turned, rotation, translation, rule)
+    return KinematicTable(chain, alignment, planar, free)
 
 
 def check_size(model: Any) -> None:
     """Refuse a model of more joints than `MAX_JOINTS`."""
     if model.njoints - 1 > MAX_JOINTS:
         raise SettingError("robot", f"of at most {MAX_JOINTS} joints", model.njoints - 1)
-
-
-def _followed_rule(model: Any, joint: int) -> tuple[float, float] | None:
-    """Return multiplier and offset by which a joint follows another; None: it moves of its own."""
-    if model.joints[joint].shortname() != "JointModelMimic":
-        return None
-    mimic = model.joints[joint].extract()
-    return float(mimic.scaling), float(mimic.offset)
 
 
 def _free_axis(model: Any, data: Any, joint: int) -> tuple[FloatArray, bool]:

@@ -15,7 +15,6 @@ from evoexp.robots.assembly import ArmParts, Chain, Link, link_capsule
 from evoexp.validation import NonNegative, Positive, check_range
 
 Range = tuple[float, float]
-Point2 = tuple[float, float]
 NUM_JOINTS = 3  # of the arm
 
 

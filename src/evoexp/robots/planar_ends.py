@@ -32,16 +32,16 @@ class PlanarArm(NamedTuple):
 
 def planar_arm(assembly: Assembly) -> PlanarArm:
     """Return the lengths and the base of a built robot that is one planar arm."""
-    table, links = assembly.table, assembly.links
+    chain, links = assembly.table.chain, assembly.links
     straight = all(not link.start.any() and not link.end[1:].any() for link in links)
-    chained = table.planar and np.array_equal(table.parent, np.arange(len(table.parent)) - 1)
-    bent = bool(table.turned[1:].any()) or bool(table.translation[:, 2].any())
-    is_complete = assembly.num_arms == 1 and len(links) == len(table.parent)
-    if not (straight and chained and is_complete) or bent:
+    in_a_row = np.array_equal(chain.parent, np.arange(len(chain.parent)) - 1)
+    bent = bool(chain.turned[1:].any()) or bool(chain.translation[:, 2].any())
+    is_complete = assembly.num_arms == 1 and len(links) == len(chain.parent)
+    if not (assembly.table.planar and straight and in_a_row and is_complete) or bent:
         was = ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices)
         raise SettingError("robot", "one planar arm in the plane z = 0", was)
-    x, y, _ = table.translation[0]
-    angle = float(atan2(table.rotation[0][3], table.rotation[0][0]))
+    x, y, _ = chain.translation[0]
+    angle = float(atan2(chain.rotation[0][3], chain.rotation[0][0]))
     return PlanarArm(np.array([link.end[0] for link in links]), float(x), float(y), angle)
 
 

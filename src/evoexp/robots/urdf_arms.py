@@ -1,7 +1,7 @@
 """The arms of one URDF: parts of one tree, whose other joints stand still or follow."""
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -9,38 +9,22 @@ import pinocchio as pin
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.robots.assembly import (
-    AppendArm,
-    ArmParts,
-    ArmStates,
-    Follower,
-    Link,
-    LinkFrames,
-    Tool,
-)
+from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool
 from evoexp.robots.bodies import placed
 from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.kinematics import own_axis
 from evoexp.robots.poses import pose_of
 from evoexp.robots.urdf_model import placed_bodies, urdf_model
-from evoexp.robots.urdf_settings import PATH, UrdfSettings
+from evoexp.robots.urdf_reading import PATH
 
-
-class Carrier(NamedTuple):
-    """The joint of the robot that carries the frame of a joint of the URDF."""
-
-    joint: int  # index of the robot's joint, 0: the world
-    placement: Any  # pin.SE3 or None
-
-    def place(self, local: Any) -> Any:
-        """Return the `pin.SE3` of a place in the frame, seen from the robot's joint."""
-        return local if self.placement is None else self.placement * local
+if TYPE_CHECKING:
+    from evoexp.robots.urdf import Urdf
 
 
 class UrdfTree:
     """A URDF as a model of all its joints, and which of them move, in which arm."""
 
-    def __init__(self, robot: UrdfSettings) -> None:
+    def __init__(self, robot: "Urdf") -> None:
         """Build the model and the bodies, and find out which joints move."""
         roles = joint_roles(robot)
         values, self.tips = standing_values(robot, roles), roles.tips
@@ -48,7 +32,7 @@ class UrdfTree:
         self.bodies = list(placed_bodies(robot, self.model, robot.file.links, PATH))
         # bodies are named by their links, numbered where a link has several; all are numbered if
         # one of these were the name of another link
-        links = [body.link for body in self.bodies]
+        self._links = links = [str(body.name) for body in self.bodies]
         numbered = [f"{link}_{links[:k].count(link)}" for k, link in enumerate(links)]
         pairs = zip(links, numbered, strict=True)
         self.names = [link if links.count(link) == 1 else name for link, name in pairs]
@@ -141,20 +125,19 @@ class UrdfTree:
         """Return the unit of a joint's values in settings: a degree, or 1 for lengths."""
         return 1.0 if own_axis(self.model, joint)[1] else DEGREE
 
-    def _carriers(self, first: int) -> list[Carrier]:
-        """Return the carriers of all joints' frames, the root's first.
+    def _carriers(self, first: int) -> list[tuple[int, Any]]:
+        """Return the robot's joint that carries each joint's frame, and its `pin.SE3` there.
 
-        `first` is the index of the first joint of the robot that comes from this URDF.
+        The root's come first; `first` is the index of the robot's first joint out of this URDF.
         """
-        carriers = [Carrier(0, self.base)]
+        carriers = [(0, self.base)]
         for joint in range(1, self.model.njoints):
             if joint in self._place_in:
-                carriers.append(Carrier(first + self._place_in[joint], None))
+                carriers.append((first + self._place_in[joint], pin.SE3.Identity()))
                 continue
-            before = carriers[self.model.parents[joint]]
-            place = before.place(self.model.jointPlacements[joint])
+            carrier, frame = carriers[self.model.parents[joint]]
             motion = _motion(self.model, joint, self._values[joint])
-            carriers.append(Carrier(before.joint, place * motion))
+            carriers.append((carrier, frame * self.model.jointPlacements[joint] * motion))
         return carriers
 
     def _arm_of(self, joint: int) -> int:
@@ -165,8 +148,8 @@ class UrdfTree:
     def _unjudged(self) -> set[frozenset[str]]:
         """Return the pairs of bodies that the SRDF disables, or of arms that meet at a joint."""
         names: dict[str, list[str]] = {}
-        for name, body in zip(self.names, self.bodies, strict=True):
-            names.setdefault(body.link, []).append(name)
+        for name, link in zip(self.names, self._links, strict=True):
+            names.setdefault(link, []).append(name)
         disabled = self._srdf.disabled if self._srdf else []
         pairs = {
             frozenset((a, b))
@@ -177,9 +160,9 @@ class UrdfTree:
         carriers = self._carriers(1)
         above = {0: -1}  # joint of the robot → the one that carries it
         for joint, place in self._place_in.items():
-            above[1 + place] = carriers[self.model.parents[joint]].joint
+            above[1 + place] = carriers[self.model.parents[joint]][0]
         bodies = [
-            (name, self._arm_of(body.joint), carriers[body.joint].joint)
+            (name, self._arm_of(body.parentJoint), carriers[body.parentJoint][0])
             for name, body in zip(self.names, self.bodies, strict=True)
         ]
         for k, (name, arm, joint) in enumerate(bodies if len(self.order) > 1 else ()):
@@ -215,26 +198,26 @@ class UrdfTree:
         first = model.njoints - sum(len(joints) for joints in self.order[:index])
         carriers, links = self._carriers(first), []
         for joint in self.order[index]:
-            before = carriers[own.parents[joint]]
-            place = before.place(own.jointPlacements[joint])
+            carrier, frame = carriers[own.parents[joint]]
+            place = frame * own.jointPlacements[joint]
             name = f"arm_{arm}_{own.names[joint]}"
-            added = model.addJoint(before.joint, own.joints[joint], place, name)
+            added = model.addJoint(carrier, own.joints[joint], place, name)
             q, into = own.idx_qs[joint], model.idx_qs[added]
             model.lowerPositionLimit[into] = own.lowerPositionLimit[q]
             model.upperPositionLimit[into] = own.upperPositionLimit[q]
             model.velocityLimit[model.idx_vs[added]] = own.velocityLimit[own.idx_vs[joint]]
-            start = np.zeros(3) if before.joint else np.array(self.base.translation)
-            links.append(Link(arm, before.joint, start, np.array(place.translation), 0.0))
+            start = np.zeros(3) if carrier else np.array(self.base.translation)
+            links.append(Link(arm, carrier, start, np.array(place.translation), 0.0))
         tool = self._tool(index, carriers)
         links.append(Link(arm, tool.joint, np.zeros(3), tool.position, 0.0))
         bodies = [
-            pin.GeometryObject(name, carrier.joint, 0, carrier.place(body.placement), body.shape)
+            pin.GeometryObject(name, carrier, 0, frame * body.placement, body.geometry)
             for name, body in zip(self.names, self.bodies, strict=True)
-            for carrier in [carriers[body.joint]]
-            if self._arm_of(body.joint) == index
+            for carrier, frame in [carriers[body.parentJoint]]
+            if self._arm_of(body.parentJoint) == index
         ]
         followers = tuple(
-            Follower(carriers[joint].joint, carriers[source].joint, multiplier, offset)
+            (carriers[source][0], carriers[joint][0], multiplier, offset)
             for joint in self.order[index]
             if joint in self._rules
             for source, multiplier, offset in [self._rules[joint]]
@@ -248,7 +231,7 @@ class UrdfTree:
         )
         return ArmParts(links, bodies, tool, self._disabled, followers, states, has_names=True)
 
-    def _tool(self, arm: int, carriers: list[Carrier]) -> Tool:
+    def _tool(self, arm: int, carriers: list[tuple[int, Any]]) -> Tool:
         """Return the tool's frame: the chosen one, or the farthest down the tree."""
         name, field = self.tips[arm]
         if name:
@@ -262,11 +245,11 @@ class UrdfTree:
                 and not joints.isdisjoint(self.model.supports[frame.parentJoint])
             ]
             frame = max(frames, key=self._depth)
-        carrier = carriers[frame.parentJoint]
-        if carrier.joint == 0:
+        carrier, place = carriers[frame.parentJoint]
+        if carrier == 0:
             raise SettingError(field, "a frame that moves", name)
-        place = carrier.place(frame.placement)
-        return Tool(carrier.joint, np.array(place.rotation), np.array(place.translation))
+        place = place * frame.placement
+        return Tool(carrier, np.array(place.rotation), np.array(place.translation))
 
     def _depth(self, frame: Any) -> tuple[int, int]:
         """Return how many moving joints carry a frame, and how many frames."""

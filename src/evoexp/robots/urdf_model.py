@@ -5,7 +5,7 @@ joints on a link by their names.
 """
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import coal
 import numpy as np
@@ -17,8 +17,10 @@ from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
 from evoexp.robots.mesh_checks import mesh_shape
 from evoexp.robots.mesh_pieces import read_pieces
-from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfJoint, read_urdf, repeated
-from evoexp.robots.urdf_settings import PATH, UrdfSettings
+from evoexp.robots.urdf_reading import LARGEST, PATH, UrdfBody, UrdfJoint, read_urdf, repeated
+
+if TYPE_CHECKING:
+    from evoexp.robots.urdf import Urdf
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 # the coordinates of planar and floating joints, and their axes in the joint's frame
@@ -39,21 +41,12 @@ UNALIGNED = {
 }
 
 
-class PlacedBody(NamedTuple):
-    """A collision body in the frame of a joint."""
-
-    link: str
-    joint: int  # index in the model; 0: it stands still
-    placement: Any  # pin.SE3
-    shape: Any  # of coal
-
-
 def coordinate_names(name: str, kind: str) -> tuple[str, ...]:
     """Name the coordinates of a joint: its own name, or several of a planar or floating one."""
     return tuple(f"{name}_{part}" for part in COORDINATES[kind]) if kind in COORDINATES else (name,)
 
 
-def urdf_model(robot: UrdfSettings) -> Any:
+def urdf_model(robot: "Urdf") -> Any:
     """Build the `pin.Model` of all joints of a URDF, one coordinate each, or none."""
     file = robot.file
     joints, root = list(file.joints.values()), file.root
@@ -89,7 +82,7 @@ def urdf_model(robot: UrdfSettings) -> Any:
     return model
 
 
-def _parts(joint: UrdfJoint, robot: UrdfSettings) -> list[UrdfJoint]:
+def _parts(joint: UrdfJoint, robot: "Urdf") -> list[UrdfJoint]:
     """Return a joint with its limits, or joints of one coordinate each in its place."""
     if joint.kind == "fixed" or (joint.kind in COORDINATES and robot.base == "fixed"):
         return [joint._replace(kind="fixed")]
@@ -107,7 +100,7 @@ def _parts(joint: UrdfJoint, robot: UrdfSettings) -> list[UrdfJoint]:
     return parts
 
 
-def _limited(joint: UrdfJoint, robot: UrdfSettings) -> UrdfJoint:
+def _limited(joint: UrdfJoint, robot: "Urdf") -> UrdfJoint:
     """Give a joint limits to either side, if it has none or is continuous."""
     setting, most = {
         "continuous": ("continuous_turns", 360.0 * DEGREE * robot.continuous_turns),
@@ -147,12 +140,11 @@ def _joint_model(joint: UrdfJoint) -> Any:
 
 
 def placed_bodies(
-    robot: UrdfSettings, model: Any, links: dict[str, tuple[UrdfBody, ...]], field: str
-) -> Iterator[PlacedBody]:
-    """Yield the collision bodies of links in the order of the model's links."""
-    for frame in model.frames:
-        if frame.type != pin.FrameType.BODY:
-            continue
+    robot: "Urdf", model: Any, links: dict[str, tuple[UrdfBody, ...]], field: str
+) -> Iterator[Any]:
+    """Yield the bodies of links as `pin.GeometryObject`s of their names, in the model's order."""
+    frames = ((k, f) for k, f in enumerate(model.frames) if f.type == pin.FrameType.BODY)
+    for k, frame in frames:
         for body in links.get(frame.name, ()):
             for shape in _shapes(robot, body):
                 shape.computeLocalAABB()
@@ -161,10 +153,10 @@ def placed_bodies(
                     must = f"a URDF whose bodies end within {LARGEST:g} m (link '{frame.name}')"
                     raise SettingError(field, must, f"{body.mesh or body.kind} to {reach:.3g}")
                 place = frame.placement * body.placement
-                yield PlacedBody(str(frame.name), int(frame.parentJoint), place, shape)
+                yield pin.GeometryObject(frame.name, frame.parentJoint, k, place, shape)
 
 
-def _shapes(robot: UrdfSettings, body: UrdfBody) -> list[Any]:
+def _shapes(robot: "Urdf", body: UrdfBody) -> list[Any]:
     """Return the coal shapes of a body, several where a mesh is cut into pieces."""
     if body.mesh is None:
         shapes = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
@@ -182,7 +174,7 @@ def _shapes(robot: UrdfSettings, body: UrdfBody) -> list[Any]:
     return read_pieces(pieces.content, np.array(body.sizes), "robot.meshes")
 
 
-def given_spheres(robot: UrdfSettings, model: Any, bodies: list[PlacedBody]) -> list[FloatArray]:
+def given_spheres(robot: "Urdf", model: Any, bodies: list[Any]) -> list[FloatArray]:
     """Read the spheres that a file gives each body: middles in its own frame and radii, (n, 4).
 
     A sphere belongs to the body of its link whose middle is nearest to its own.
@@ -201,9 +193,9 @@ def given_spheres(robot: UrdfSettings, model: Any, bodies: list[PlacedBody]) -> 
     rows: list[list[list[float]]] = [[] for _ in bodies]
     for sphere in placed_bodies(robot, model, given, field):
         point = sphere.placement.translation
-        own = [k for k, body in enumerate(bodies) if body.link == sphere.link]
-        middles = [bodies[k].placement.act(bodies[k].shape.aabb_center) for k in own]
+        own = [k for k, body in enumerate(bodies) if body.name == sphere.name]
+        middles = [bodies[k].placement.act(bodies[k].geometry.aabb_center) for k in own]
         if own:
             k = own[int(np.argmin([np.sum((middle - point) ** 2) for middle in middles]))]
-            rows[k].append([*bodies[k].placement.actInv(point), float(sphere.shape.radius)])
+            rows[k].append([*bodies[k].placement.actInv(point), float(sphere.geometry.radius)])
     return [np.array(each).reshape(-1, 4) for each in rows]

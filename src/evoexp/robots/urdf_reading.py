@@ -22,6 +22,7 @@ import yaml
 from evoexp.errors import SettingError, nearest
 from evoexp.input_files import stand_in
 
+PATH = "robot.path"  # the setting that names the URDF, for errors
 MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
@@ -119,7 +120,7 @@ def parsed_xml(content: bytes, field: str, tag: str) -> Any:
 
 
 @functools.lru_cache(maxsize=32)
-def urdf_file(content: bytes, field: str = "robot.path") -> UrdfFile:
+def urdf_file(content: bytes, field: str = PATH) -> UrdfFile:
     """Read a URDF whose links form one tree."""
     file = read_urdf(content, field)
     _check_tree(list(file.links), file.joints, field)

@@ -43,15 +43,16 @@ class GridMotion(Component):
     def _nodes_are_inside(self) -> Self:
         if math.prod(self.size) > MOST_NODES:
             raise SettingError("size", f"of at most {MOST_NODES:,} nodes", list(self.size))
+        inside = " × ".join(f"0..{count - 1}" for count in self.size)
         for name in ("start", "goal"):
             node = getattr(self, name)
             if len(node) != len(self.size) or not self._are_nodes(node, node):
-                raise SettingError(name, f"a node inside the grid ({self.inside})", list(node))
+                raise SettingError(name, f"a node inside the grid ({inside})", list(node))
         if self.start == self.goal:
             raise SettingError("goal", "another node than start", list(self.goal))
         half = len(self.size)
         for k, corners in enumerate(self.obstacles):
-            must = f"from a lower to an upper corner inside the grid ({self.inside})"
+            must = f"from a lower to an upper corner inside the grid ({inside})"
             if len(corners) != 2 * half:
                 must = f"two corners, {2 * half} numbers"
             elif self._are_nodes(corners[:half], corners[half:]):
@@ -62,11 +63,6 @@ class GridMotion(Component):
     def _are_nodes(self, low: tuple[int, ...], high: tuple[int, ...]) -> bool:
         """Return whether two nodes are inside the grid, the first nowhere above the second."""
         return all(0 <= a <= b < n for a, b, n in zip(low, high, self.size, strict=True))
-
-    @property
-    def inside(self) -> str:
-        """The nodes in words: "0..31 × 0..31"."""
-        return " × ".join(f"0..{count - 1}" for count in self.size)
 
     def blocked(self) -> np.ndarray:
         """Return which nodes belong to obstacles, (nodes along x, along y[, along z])."""

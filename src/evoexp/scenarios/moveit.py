@@ -25,13 +25,14 @@ from evoexp.scenarios.moveit_files import (
     primitive_kind,
     read_document,
 )
-from evoexp.scenarios.moveit_frames import Frames, has_other_frames
 from evoexp.scenarios.moveit_scene import (
     AllowedPairs,
+    Frames,
     LoadMesh,
     SceneMesh,
     World,
     check_robot_place,
+    has_other_frames,
     read_allowed,
     read_state,
     read_world,

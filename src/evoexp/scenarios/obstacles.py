@@ -43,19 +43,13 @@ class BoxObstacle(NamedObstacle):
     rotation: Angles = (0.0, 0.0, 0.0)
 
 
-class CapsuleObstacle(NamedObstacle):
-    """All points within `radius` of the segment from `start` to `end`."""
+class RodObstacle(NamedObstacle):
+    """A segment from `start` to `end`, thickened.
 
-    shape: Literal["capsule"]
-    start: Point
-    end: Point
-    radius: Positive
+    A capsule is all points within `radius` of it, a cylinder has flat ends.
+    """
 
-
-class CylinderObstacle(NamedObstacle):
-    """A solid cylinder with flat ends, its axis from `start` to `end`."""
-
-    shape: Literal["cylinder"]
+    shape: Literal["capsule", "cylinder"]
     start: Point
     end: Point
     radius: Positive
@@ -103,13 +97,7 @@ class HullObstacle(NamedObstacle):
 
 
 Obstacle = Annotated[
-    SphereObstacle
-    | BoxObstacle
-    | CapsuleObstacle
-    | CylinderObstacle
-    | HalfSpaceObstacle
-    | EllipseObstacle
-    | HullObstacle,
+    SphereObstacle | BoxObstacle | RodObstacle | HalfSpaceObstacle | EllipseObstacle | HullObstacle,
     Field(discriminator="shape"),
 ]
 
@@ -171,7 +159,7 @@ def _row(obstacle: Any, field: str) -> tuple[int, FloatArray, FloatArray, Any]:
     start, end = _point(obstacle.start), _point(obstacle.end)
     if (size := length(end - start)) == 0.0:
         raise SettingError(f"{field}.end", "another point than start", list(obstacle.end))
-    kind, turn = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE, end - start
+    kind, turn = CYLINDER if obstacle.shape == "cylinder" else CAPSULE, end - start
     return kind, 0.5 * (start + end), _z_along(turn / size), (obstacle.radius, 0.5 * size, 0.0)
 
 

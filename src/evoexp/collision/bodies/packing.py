@@ -119,7 +119,7 @@ def _pack_bodies(
     runs, spheres, capsules = list[tuple[int, int]](), list[int](), list[int]()
     for k, (number, joint) in enumerate(zip(numbers, joints, strict=True)):
         own = np.flatnonzero(shapes.body == number)
-        frame = joint - 1 if joint > 0 else len(table.parent)
+        frame = joint - 1 if joint > 0 else len(table.chain.parent)
         pieces = _cut(own, start + 0.5 * axis, is_sphere)
         begin, next_part = (len(runs), len(capsules)), len(numbers) + len(parts)
         for piece in pieces:

@@ -130,7 +130,7 @@ def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
     slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
     links = [link for link in assembly.links if not link.is_tool]
     is_straight = not any(link.start.any() or link.end[1:].any() for link in links)
-    is_flat = assembly.table.planar and not assembly.table.turned.any()
+    is_flat = assembly.table.planar and not assembly.table.chain.turned.any()
     if not (is_flat and is_straight and all(stop - first == 2 for first, stop in slices)):
         raise SettingError(
             "robot",
@@ -139,7 +139,7 @@ def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
         )
     arms = []
     for first, stop in slices:
-        x, y, _ = assembly.table.translation[first]
+        x, y, _ = assembly.table.chain.translation[first]
         lengths = [float(link.end[0]) for link in links if first < link.joint <= stop]
         arms.append(Arm((float(x), float(y)), (lengths[0], lengths[1])))
     return tuple(arms)

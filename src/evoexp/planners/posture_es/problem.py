@@ -225,7 +225,7 @@ def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
 
     The point lies on the axis of the first joint: at the second joint, if that is on this axis.
     """
-    table, tool = assembly.table, assembly.tools[0]
+    table, tool = assembly.table.chain, assembly.tools[0]
     joint, far = tool.joint - 1, float(np.sqrt(np.sum(tool.position * tool.position)))
     # the greatest slide of each joint; 0 if it turns
     multiplier, offset = table.rule.T

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.papers.rana import measures
+from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import counted
@@ -21,12 +21,12 @@ def fresh(condition: ConditionResults, *, redistributed: bool) -> FloatArray:
     settings = {"redistribution": redistributed, "relaxation_step": 0.0}
     planner = condition.planner.model_copy(update=settings)
     rng = np.random.Generator(np.random.PCG64(0))
-    return np.asarray(planner.sample(measures.problem(condition), rng, FRESH))
+    return np.asarray(planner.sample(condition.problem(Problem), rng, FRESH))
 
 
 def steps(condition: ConditionResults, q: FloatArray) -> list[FloatArray]:
     """Return the lengths of each arm's steps between via-points of q, (nq, N + 1, …) [deg]."""
-    arms = measures.problem(condition).arm_slices
+    arms = condition.problem(Problem).arm_slices
     return [np.linalg.norm(np.diff(q[first:stop], axis=1), axis=0) for first, stop in arms]
 
 
@@ -40,7 +40,7 @@ def shortened(condition: ConditionResults) -> Proportion:
     strings = fresh(condition, redistributed=True)
     relaxing = condition.planner.model_copy(update={"redistribution": False})
     rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
-    relaxed = relaxing.improve(measures.problem(condition), strings, rng)
+    relaxed = relaxing.improve(condition.problem(Problem), strings, rng)
     before, after = (sum(s.sum(axis=0) for s in steps(condition, q)) for q in (strings, relaxed))
     return counted(np.less(after, before))
 

@@ -140,7 +140,8 @@ def test_expected_effort_counts_failures(outputs: Path) -> None:
     table = population_effort.effort_table(found, shares, effort, 0.95, 50)
     rows = dict(list(table.groupby("quantity")["expected"]))
     assert set(rows["goal met"]) == {0.5}
-    expected = [8.0 / c.solved if c.solved else np.inf for c in found[0].conditions]
+    own = found[0].by_value.values()
+    expected = [8.0 / c.solved if c.solved else np.inf for c in own]
     assert list(rows["spent [-]"]) == expected
     draw = functools.partial(population_effort.draw_effort, setting="λ", marked=100.0)
     assert can_be_drawn(table, draw)

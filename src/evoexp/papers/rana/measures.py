@@ -11,6 +11,7 @@ from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray, generations
+from evoexp.report.figures import DECIMALS
 from evoexp.report.pages import markdown
 from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.run_measures import grouped, summed
@@ -51,6 +52,12 @@ def sampled(condition: ConditionResults, solution: FloatArray, samples: int) -> 
     """Return a solution's motion, sampled per segment, (nq, instants) [deg]."""
     q = motion_geometry.configurations(condition.prepared, solution)
     return motion_geometry.dense(q, samples)[1]
+
+
+def straight_centres(condition: ConditionResults, samples: int) -> float:
+    """Return the least distance of centres along the straight line [length unit]."""
+    q = sampled(condition, straight_line(condition), samples)
+    return round(float(condition.problem(Problem).centre_distances(q).min()), DECIMALS)
 
 
 def straight_length(condition: ConditionResults) -> float:
@@ -259,12 +266,6 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "who": lambda results, condition: f"{condition.label}: " if len(results.main) > 1 else "",
     "arms": lambda main: " and ".join(
         ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
-    ),
-    # least distance of centres along the straight line [length unit]
-    "straight_centres": lambda condition, samples: float(
-        condition.problem(Problem)
-        .centre_distances(sampled(condition, straight_line(condition), samples))
-        .min()
     ),
     # all conditions of each scene in the plane, or in space, and the end of its figure's stem
     "planar_scenes": lambda results: [s for s in _scenes(results) if planar(s[0].with_data[0])],

@@ -141,7 +141,7 @@ def count_pairs(
                 hits = np.int16(tally[U(r * two.width + n)])
                 counts[i, U(n)] = hits
                 sums_2[U(n)] += hits
-                total += hits
+                total += int(hits)
             sums_1[i] = total
 
 

@@ -112,7 +112,7 @@ def refuted(condition: ConditionResults) -> RefutedMotions:
 
 def untouched(condition: ConditionResults) -> BoolArray:
     """Return whether each accepted motion touches nothing, (solved,)."""
-    return ~run_measures.touches(condition)[run_measures.solved(condition)]
+    return np.logical_not(run_measures.touches(condition)[run_measures.solved(condition)])
 
 
 def told_shares(condition: ConditionResults, confidence: float) -> str:

@@ -49,7 +49,7 @@ class Hearing(NamedTuple):
     def above(self, share: Proportion, level: float) -> Claim:
         """Judge a claim that something holds in more than some percent."""
         interval, least = share.interval(level), 0.01 * self.rule.limits["percent"]
-        size = self._share("share", *share, least)
+        size = self._share(*share, least)
         holds, fails = interval.low > least, interval.high < least
         return self._claim("above", share.with_interval(level), share.total, holds, fails, size)
 

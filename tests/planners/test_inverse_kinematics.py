@@ -53,9 +53,9 @@ def test_individuals_are_the_postures_that_plain_steps_end_at(arm: str) -> None:
         sub_path, count = int(record.terms["sub_path"]) - 1, record.population.shape[1]
         start = start if sub_path else scene.start
         drawn = rng.random((len(start), count))
-        drawn = scene.low[..., 0] + (scene.high - scene.low)[..., 0] * drawn
+        drawn = scene.low + (scene.high - scene.low) * drawn
         costs = scene.costs(sub_path, start, record.population)
-        np.testing.assert_allclose(record.costs, costs, atol=1e-9)
+        np.testing.assert_allclose(record.costs[0], costs, atol=1e-9)
         off = np.linalg.norm(to_target(scene, record.population, sub_path), axis=-1)
         arrived = off <= 1.001e-9 * scene.lengths.sum()
         num_arrived += arrived.sum()
@@ -76,13 +76,15 @@ def test_both_arms_are_brought_there_in_few_generations_again_and_again(arm: str
     runs = [ran(condition("ga.population_size=200", arm=arm), 1) for _ in range(2)]
     last, again = (run.last for run in runs)
     assert last.solved and last.index < 10
-    assert last.best_cost < runs[0].planner.stop_costs[1]
+    assert last.best_cost < 2.0
     assert runs[0].planner.departures(runs[0].problem, last.best) == []
     assert last.best.tobytes() == again.best.tobytes() and last.state == again.state
 
 
 def test_bits_and_another_planner_are_refused_in_one_line() -> None:
-    must = "ga: must be a real_genetic, whose genes are joint angles, was [^\n]*binary_genetic[^\n]*$"
+    must = (
+        "ga: must be a real_genetic, whose genes are joint angles, was [^\n]*binary_genetic[^\n]*$"
+    )
     with pytest.raises(SettingError, match=must):
         condition("ga=lavoie_binary").prepare()
     must = "planner: must be redundant_ga, whose sub-paths inverse_kinematics draws, was [^\n]*$"

@@ -1,5 +1,7 @@
 """The damped pseudoinverse in the loop of Lavoie & Boudreau 2001, by plain steps in numpy."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -46,7 +48,8 @@ def test_individuals_are_the_postures_that_plain_steps_end_at(arm: str) -> None:
     """Between the start of the sub-path, whose descent comes first, and uniform postures."""
     chosen = condition(*SMALL, *NEVER, arm=arm)
     records, rng = ran(chosen, 5).records, np.random.default_rng(5)
-    scene = lavoie_numpy.Scene(chosen._replace(planner=chosen.planner.planner))  # type: ignore[attr-defined]
+    control: Any = chosen.planner
+    scene = lavoie_numpy.Scene(chosen._replace(planner=control.planner))
     start, num_arrived = scene.start, 0
     assert [int(record.terms["sub_path"]) for record in records] == [1, 2, 2, 2, 2] * 2
     for index, record in enumerate(records):

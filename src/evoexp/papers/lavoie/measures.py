@@ -19,9 +19,11 @@ Contact = tuple[float, str]
 """Instant of a first contact, names of the bodies."""
 
 
-# position error at the end of SP2, (done,) [length unit], and evaluations; inf: no solution
+# position error at the end of SP2, (done,) [length unit], evaluations, and CPU time of the search
+# [s]; inf: no solution
 errors = run_measures.where_solved(by_column("term_position_error_sp2"))
 effort = run_measures.where_solved(by_column("evaluations"))
+seconds = run_measures.where_solved(run_measures.search_seconds)
 BOUNDS = (1.0, 2.0)  # those of the printed percentages
 BOUND = BOUNDS[0]  # by which the percentages differ most
 

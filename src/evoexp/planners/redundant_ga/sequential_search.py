@@ -24,16 +24,18 @@ class SequentialSearch(WrappedPlanner):
 
     component: ClassVar[str] = "sequential_search"
 
+    search: ClassVar[type[DrawnSearch]] = DrawnSearch
+
     planner: RedundantGa  # the planner whose loop, sampling and budget are used
 
     @field_validator("planner", mode="before")
     @classmethod
     def _planner_fits(cls, planner: Any) -> Any:
         if isinstance(planner, Component) and not isinstance(planner, RedundantGa):
-            must = "redundant_ga, whose sub-paths sequential_search draws"
+            must = f"redundant_ga, whose sub-paths {cls.component} draws"
             raise SettingError("planner", must, planner.component)
         return planner
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the generations of all draws; their indices go on counting."""
-        return self.planner.search_in_turn(problem, rng, DrawnSearch)
+        return self.planner.search_in_turn(problem, rng, self.search)

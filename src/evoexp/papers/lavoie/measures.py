@@ -114,7 +114,8 @@ def refuted(condition: ConditionResults) -> RefutedMotions:
 
 def untouched(condition: ConditionResults) -> BoolArray:
     """Return whether each accepted motion touches nothing, (solved,)."""
-    return np.logical_not(run_measures.touches(condition)[run_measures.solved(condition)])
+    touches = run_measures.touches(condition)[run_measures.solved(condition)]
+    return np.asarray(~touches, dtype=np.bool_)
 
 
 def told_shares(condition: ConditionResults, confidence: float) -> str:

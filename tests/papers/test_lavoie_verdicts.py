@@ -172,17 +172,17 @@ def sweep(results: Results, contacts: dict[str, int] | None = None) -> list[Clai
 
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:
-    name, spread = "stop below {}, at most {}", np.linspace(0.0, 0.1, 100)
+    name, spread = "stop below {}, at most {}", np.linspace(0.0, 0.1, 200)
     pairs = [(stop, most) for stop in ("2.0", "1.5", "1.0") for most in (100, 300)]
     errors = {name.format(*pair): float(pair[0]) / 4.0 + spread for pair in pairs}
     errors[name.format("1.0", 300)] = errors[name.format("1.5", 300)]  # the last brings nothing
-    unsolved = np.arange(100) < 45  # the worst class
+    unsolved = np.arange(200) < 90  # the worst class
     errors[name.format("1.0", 100)] = np.where(unsolved, np.nan, 0.25 + spread)
     first, second, more = sweep(made_up(errors, "lavoie_stopping"))
     assert (first.verdict, second.verdict, more.verdict) == (UNDECIDED, EQUAL, REPRODUCED)
     assert "at most 100 generations" in first.text
     assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3455 below 1" in first.evidence
-    assert "55 of 100" in more.evidence
+    assert "110 of 200" in more.evidence
     errors[name.format("1.0", 100)] = 0.25 + spread
     assert sweep(made_up(errors, "lavoie_stopping"))[0].verdict == REPRODUCED
 

@@ -181,7 +181,7 @@ def test_smaller_stopping_values_are_judged_step_by_step() -> None:
     first, second, more = sweep(made_up(errors, "lavoie_stopping"))
     assert (first.verdict, second.verdict, more.verdict) == (UNDECIDED, EQUAL, REPRODUCED)
     assert "at most 100 generations" in first.text
-    assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3455 below 1" in first.evidence
+    assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3452 below 1" in first.evidence
     assert "110 of 200" in more.evidence
     errors[name.format("1.0", 100)] = 0.25 + spread
     assert sweep(made_up(errors, "lavoie_stopping"))[0].verdict == REPRODUCED

@@ -7,7 +7,6 @@ import pytest
 
 from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
-from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
@@ -90,13 +89,7 @@ def test_the_cap_is_kept_by_all_paths() -> None:
             assert problem.fields.unsafeness[path[1 : path[0] + 1]].max() <= 7.0
 
 
-def test_what_cannot_be_is_refused() -> None:
-    must = "distance_weight: must be above 0, or unsafeness_weight is"
-    with pytest.raises(SettingError, match=must):
-        PathCost(distance_weight=0.0, unsafeness_weight=0.0)
-    must = r"robot\.dimensions: must be as many as the grid has \(2\), was 3"
-    with pytest.raises(SettingError, match=must):
-        planner().prepare(robot(3), scenario(np.zeros((4, 4), dtype=bool)))
+def test_paths_of_another_kind_are_refused() -> None:
     own = planner()
     with pytest.raises(ValueError, match="paths must be"):
         own.cost(solvable((4, 4), 0.0, 0, own), np.zeros((3, 4), dtype=np.int32))

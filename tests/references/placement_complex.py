@@ -105,11 +105,3 @@ def slide(model: Directions, x: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
         if cost(model, x) < least and abs(height(model, x)) < 1e-9:
             least, end = float(cost(model, x)), x
     return end, least
-
-
-def minima(costs: np.ndarray, in_reach: np.ndarray, cap: float) -> np.ndarray:
-    """Return which places of two sheets (2, n, n) are minima, where both angles go all around."""
-    shifts = [(one, two) for one in (-1, 0, 1) for two in (-1, 0, 1)]
-    lowest_around = np.stack([np.roll(costs, shift, axis=(1, 2)) for shift in shifts]).min(axis=0)
-    at_edge = np.stack([np.roll(~in_reach, shift, axis=(0, 1)) for shift in shifts]).any(axis=0)
-    return (costs <= lowest_around) & (~at_edge | (costs <= lowest_around[::-1])) & (costs < cap)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evoexp.references.placement_conventional import slide
-from evoexp.references.placement_optimum import lowest, minima_of, polish
+from evoexp.references.placement_optimum import lowest
 from evoexp.references.placement_programme import (
     MARGINS,
     TORQUE_BOUNDS,
@@ -60,33 +60,6 @@ def test_the_programme_and_its_derivatives_are_those_of_complex_steps(
     np.testing.assert_allclose(slow.gradient(smooth, x), plain, rtol=1e-6)
 
 
-def test_costs_and_legality_at_directions() -> None:
-    model, rng = limited("minimax"), np.random.default_rng(4)
-    programme, legal = Programme(model), 0
-    for x in rng.uniform(-3.0, 3.0, (200, 3)):
-        assert programme.cost(x) == pytest.approx(slow.cost(model, x), rel=1e-11)
-        expected = abs(slow.height(model, x)) < 0.5 and (slow.margins(model, x) > -0.5).all()
-        assert programme.is_legal(x, 0.5) == expected
-        legal += expected
-    assert 5 < legal < 150
-
-
-@pytest.mark.parametrize("case", LABELS)
-def test_many_costs_at_once_are_the_planners(case: str) -> None:
-    own, model, rng = problem(case), directions(case), np.random.default_rng(1)
-    pairs = rng.uniform(-180.0, 180.0, (2, 300))
-    costs, theta_3 = own.model.measure_branches(pairs)
-    kept = costs < 250.0
-    places = zip(*np.nonzero(kept), strict=True)
-    x = np.array([model.directions(pairs[:, k], theta_3[b, k]) for b, k in places]).T
-    assert x.shape[1] > 60
-    np.testing.assert_allclose(model.costs(*model.links(x)), costs[kept], rtol=1e-9)
-    assert np.abs(slow.height(model, x)).max() < 1e-12
-    everything = model._replace(avoided=POINTS)
-    expected = slow.cost(everything, x)
-    np.testing.assert_allclose(everything.costs(*everything.links(x)), expected, rtol=1e-11)
-
-
 def starts_of(case: str, model: Directions, count: int) -> list[np.ndarray]:
     """Return directions of the lowest minima of a coarse search."""
     rows = lowest(problem(case).model, AROUND, 60, count)
@@ -105,30 +78,3 @@ def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
         assert costs[k] == pytest.approx(least, rel=1e-5)
         np.testing.assert_allclose(ends[:, k], end, atol=1e-5)
         np.testing.assert_array_equal(ends[:, k], ends[:, k + len(starts)])
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_minima_are_marked_as_by_rolling(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    costs = rng.integers(0, 6, (2, 17, 17)).astype(float)  # with ties
-    in_reach = rng.random((17, 17)) < 0.9
-    costs[:, ~in_reach] = np.inf
-    least = minima_of(costs, in_reach, np.array([True, True])) & (costs < 5.0)
-    np.testing.assert_array_equal(least, slow.minima(costs, in_reach, 5.0))
-    ends = np.full((2, 9, 9), 3.0)  # of a range that is no turn
-    ends[0, 0, 4], ends[0, 8, 4] = 2.0, 1.0
-    for turns, expected in ((True, 1), (False, 2)):
-        least = minima_of(ends, np.ones((9, 9), dtype=bool), np.array([turns, True]))
-        assert np.count_nonzero(least & (ends < 2.5)) == expected
-
-
-def test_a_polished_minimum_meets_its_conditions_and_others_are_refused() -> None:
-    model = directions("minimax")
-    programme, start = Programme(model), starts_of("minimax", model, 1)[0]
-    end = programme.descend(start)
-    found = polish(programme, end.x)
-    assert found is not None
-    torques = np.abs(slow.weighted_torques(model, found.x))
-    np.testing.assert_allclose(torques, found.cost, atol=1e-12)
-    assert abs(slow.height(model, found.x)) < 1e-13
-    assert polish(programme, start) is None, "Newton's method leads far away from there"

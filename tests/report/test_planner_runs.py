@@ -86,6 +86,7 @@ def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -
 def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
     table, spent = answer_table(SOME), np.array([9000.0, 9100.0, 9200.0])
     assert tuple(table.columns) == Answer._fields
+    assert list(answer_table([]).dtypes) == list(table.dtypes)
     runs = PlannerRuns("", Problem("p"), "", table, (0, 1, 2), spent, None)
     assert runs.best_lengths.tolist() == [5.0, np.inf, 7.0]
     for most, first in ((np.inf, [4000.0, 9100.0, 2000.0]), (5.5, [8000.0, 9100.0, 9200.0])):
@@ -94,16 +95,6 @@ def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
         assert reached.tolist() == [True, False, most > 7.0]
     assert straight_line(table) == 4.0
     assert np.isnan(straight_line(table.assign(straight=[1.0, 2.0, 2.0, 2.0])))
-
-
-def test_no_answer_at_all_is_a_table_too() -> None:
-    table = answer_table([])
-    assert list(table.dtypes) == list(answer_table(SOME).dtypes)
-    assert tuple(table.columns) == Answer._fields
-    runs = PlannerRuns("", Problem("p"), "", table, (0, 1), np.array([3.0, 4.0]), None)
-    assert runs.best_lengths.tolist() == [np.inf, np.inf]
-    effort, reached = runs.first_reached()
-    assert effort.tolist() == [3.0, 4.0] and not reached.any()
 
 
 @pytest.mark.parametrize("seed", range(3))

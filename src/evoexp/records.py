@@ -112,6 +112,11 @@ class Block(NamedTuple):
         return len(self.lowest)
 
     @property
+    def best(self) -> FloatArray:
+        """The best solution so far behind the last generation."""
+        return self.bests[-1].solution
+
+    @property
     def best_of_each(self) -> list[Best]:
         """The best so far behind each generation."""
         places = [best.place for best in self.bests[1:]]

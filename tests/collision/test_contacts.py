@@ -245,7 +245,7 @@ def test_large_angles_and_what_is_not_a_number_are_measured_exactly() -> None:
 
 def test_spheres_at_unequal_steps_are_measured_exactly() -> None:
     collision, links = touching(TWO_PLANAR), np.array([[0, 5]])
-    joint, local, radius = collision.spheres
+    joint, local, radius = collision.shapes.joint, collision.shapes.start, collision.shapes.radius
     for axis, is_equal in ((0, True), (1, False), (2, False)):
         moved = local.copy()
         moved[2, axis] += 0.0 if is_equal else 0.7
@@ -263,7 +263,7 @@ def test_spheres_at_unequal_steps_are_measured_exactly() -> None:
 def test_circles_stand_joint_to_joint_and_shared_ones_count_once() -> None:
     collision = touching(TWO_PLANAR)
     assert collision.arm_spheres.tolist() == [[0, 9], [9, 18]]
-    assert collision.spheres.local[:9, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0]
-    assert touching(ROBOTS["alone"], 1).spheres.local[:, 0].tolist() == [2.0, 2.0]
+    assert collision.shapes.start[:9, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0]
+    assert touching(ROBOTS["alone"], 1).shapes.start[:, 0].tolist() == [2.0, 2.0]
     with pytest.raises(ValueError, match=r"q must have shape \(4, configurations\)"):
         collision.clearance(np.zeros((3, 5)))

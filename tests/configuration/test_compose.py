@@ -328,7 +328,7 @@ def generations(experiment: Experiment) -> set[int]:
 
 def test_budgets_cap_and_quick_keeps_the_hashes() -> None:
     paper, quick, smoke = (expanded("rana_planar", each) for each in ("paper", "quick", "smoke"))
-    assert (paper.num_replicates, quick.num_replicates, smoke.num_replicates) == (20, 5, 2)
+    assert (paper.num_replicates, quick.num_replicates, smoke.num_replicates) == (200, 5, 2)
     assert quick.conditions == paper.conditions
     assert (generations(paper), generations(smoke)) == ({500}, {10})
     assert not {c.id for _, c in smoke.conditions} & {c.id for _, c in paper.conditions}

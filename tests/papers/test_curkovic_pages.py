@@ -226,11 +226,11 @@ def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> Non
     (paper,) = compose.expand(["experiment=curkovic_pareto"])[0].conditions
     other_seed = paper.condition._replace(seed=5)
     for condition, planned, budget, reason in (
-        (paper.condition, 20, "paper", ""),
-        (other_seed, 20, "paper", ""),
-        (paper.condition, 20, "quick", "budget quick"),
+        (paper.condition, 200, "paper", ""),
+        (other_seed, 200, "paper", ""),
+        (paper.condition, 200, "quick", "budget quick"),
         (paper.condition, 3, "paper", "fewer replicates than planned"),
-        (own.condition, 20, "paper", "settings overridden"),
+        (own.condition, 200, "paper", "settings overridden"),
     ):
         judged = dataclasses.replace(own, condition=condition, planned=planned)
         results = found._replace(budget=budget, conditions=(judged,))

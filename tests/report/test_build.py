@@ -116,7 +116,7 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
     rows += ["| `ga.crossover_rate` | 0.9 | – | paper: Tab. 1, cross_over_probability |"]
     rows += ["| `ga.population_size` | 12 | – | override |", "via-point GA against random search"]
     assert [row for row in rows if row not in text] == []
-    assert text.count("not judged (budget smoke)") == 4
+    assert text.count("not judged (budget smoke)") == 9
     assert re.search(r"C5 = [1-9]\d* of 20 instants", text)
     assert all((page.parent / link).is_file() for link in re.findall(r"\]\(([^)]+)\)", text))
     assert "Partial results" not in text
@@ -173,10 +173,10 @@ def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> 
     (_, paper), *_ = compose.expand(["experiment=rana_planar"])[0].conditions
     own, judged = results.conditions[0], results._replace(budget="paper")
     for given, condition, planned, reason in (
-        (judged, paper, 20, ""),
-        (results, paper, 20, "budget smoke"),
-        (judged, paper, 3, "3 of 20 replicates planned"),
-        (judged, own.condition, 20, "overridden: ga.population_size, ga.num_generations"),
+        (judged, paper, 200, ""),
+        (results, paper, 200, "budget smoke"),
+        (judged, paper, 3, "3 of 200 replicates planned"),
+        (judged, own.condition, 200, "overridden: ga.population_size, ga.num_generations"),
     ):
         changed = dataclasses.replace(own, condition=condition, planned=planned)
         assert rana_claims.not_judged(given, changed) == reason

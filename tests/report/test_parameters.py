@@ -50,7 +50,7 @@ def test_values_units_and_sources_come_from_options_and_comments() -> None:
     assert rows["scenario.q_goal[0]"][1:3] == ("[135.0, 135.0]", "deg")
     assert rows["planner.num_via_points"].source.startswith("assumed: ")
     assert rows["seed"].source.startswith("assumed")
-    assert rows["num_replicates"].value == "20"
+    assert rows["num_replicates"].value == "200"
     # another option than the experiment's own
     assert other["scenario"].source == "conf/scenario/rana_obstacles.yaml"
     assert other["scenario.obstacles[1].size"][1:] == ("[0.8, 0.8]", "unit", "assumed")
@@ -126,5 +126,5 @@ def test_an_option_file_is_read_with_its_comments_and_those_that_it_takes_in(
 
 
 def test_planned_replicates_are_those_without_a_cap() -> None:
-    assert parameters.planned_replicates(Results("rana_planar", "smoke", ())) == 20
+    assert parameters.planned_replicates(Results("rana_planar", "smoke", ())) == 200
     assert parameters.planned_replicates(Results("", "", ())) == 20

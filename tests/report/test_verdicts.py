@@ -205,6 +205,8 @@ def test_a_rule_that_is_wrong_is_refused(tmp_path: Path, kind: str, more: str, n
 REPRODUCING = {
     "every": ("20", 20, 20, 20),
     "majority": ("20", 20, 20),
+    "above": (Proportion(20, 20), 0.95),
+    "at least": (20.0,),
     "better": (BETTER, "lower"),
     "better than all": ("20", [BETTER]),
     "best": ("20", [BETTER], True),
@@ -218,14 +220,15 @@ REPRODUCING = {
 def test_a_claim_carries_its_rule_and_is_judged_by_its_kind_alone(
     tmp_path: Path, kind: str
 ) -> None:
-    rules = rules_of(tmp_path, kind, OWN if kind == "own" else "")
+    limits = ", limits: {percent: 50.0, number: 10.0}" if kind in ("above", "at least") else ""
+    rules = rules_of(tmp_path, kind, OWN if kind == "own" else limits)
     on = judging.Judge("", page_settings("", "rana"), rules).on("told", who="", metric="cycles")
     claim = judge(on, kind, REPRODUCING[kind])
     # 20 runs that agree are no proof that two shares are the same
     verdict, rule = ("undecided", "practically") if kind == "same share" else ("reproduced",) * 2
     assert (claim.verdict, claim.name) == (verdict, "told")
     assert claim.rule.startswith(rule) and "{" not in claim.rule
-    assert any(number in claim.n for number in ("20", "12"))
+    assert any(number in claim.n for number in ("20", "12", "–"))
     for other in KINDS.keys() - {kind}:
         with pytest.raises(ValueError, match=f"its rule is '{kind}'"):
             judge(on, other, REPRODUCING[other])

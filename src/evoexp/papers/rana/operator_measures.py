@@ -1,4 +1,4 @@
-"""What the paper says its operators do to strings, measured on strings that nothing selected."""
+"""Effects of the operators of Rana & Zalzala 1995 on strings that nothing has selected."""
 
 from collections.abc import Callable
 from typing import Any

@@ -48,14 +48,14 @@ class Hearing(NamedTuple):
 
     def above(self, share: Proportion, level: float) -> Claim:
         """Judge a claim that something holds in more than some percent."""
-        interval, least = share.interval(level), 0.01 * self.rule.limits["percent"]
+        interval, least = share.interval(level), 0.01 * self.rule.limits.get("percent", 0.0)
         size = self._share(*share, least)
         holds, fails = interval.low > least, interval.high < least
         return self._claim("above", share.with_interval(level), share.total, holds, fails, size)
 
     def at_least(self, number: float) -> Claim:
         """Judge a claim about a number that needs no runs."""
-        holds = number >= self.rule.limits["number"]
+        holds = number >= self.rule.limits.get("number", 0.0)
         return self._claim("at least", markdown.number(number), "–", holds, not holds, None)
 
     def better(self, row: Comparison | None, word: str, told: str = "{}") -> Claim:

@@ -245,7 +245,8 @@ def test_large_angles_and_what_is_not_a_number_are_measured_exactly() -> None:
 
 def test_spheres_at_unequal_steps_are_measured_exactly() -> None:
     collision, links = touching(TWO_PLANAR), np.array([[0, 5]])
-    joint, local, radius = collision.shapes.joint, collision.shapes.start, collision.shapes.radius
+    shapes = collision.shapes
+    joint, local, radius = shapes.joint - 1, shapes.start, collision.radius
     for axis, is_equal in ((0, True), (1, False), (2, False)):
         moved = local.copy()
         moved[2, axis] += 0.0 if is_equal else 0.7

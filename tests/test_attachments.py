@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from evoexp import attachments
+from evoexp.attachments import MissingFile
 from evoexp.batch.jobs import Job, run_jobs
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log
@@ -67,6 +68,8 @@ def test_a_stored_run_has_its_files(path: Path, tmp_path: Path) -> None:
     run = RunDirectory(tmp_path, condition.id)
     run.create(condition.to_json(), {}, condition.files())
     forget()
+    with pytest.raises(MissingFile, match="give the file again"):
+        Condition.from_json(condition.to_json()).prepare()
     again = Condition.from_json(run.config_json())
     assert again.prepare().problem.fields.grid.free.sum() == 14
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from evoexp.errors import SettingError, UnknownSetting, nearest
@@ -28,6 +28,16 @@ Rate = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Vector = tuple[float, ...]
+
+
+def _with_room(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise PydanticCustomError("no_room", "[least, greatest] with least < greatest")
+    return limits
+
+
+Limits = Annotated[tuple[float, float], AfterValidator(_with_room)]
+"""Least and greatest value, with room between them."""
 
 TARGET = "_target_"
 MOST_QUERIES = "max_collision_queries"  # of a condition; left out where nothing is capped
@@ -172,7 +182,8 @@ def _settings_error(
     if first["type"] == "model_type" and not any(issubclass(k, Component) for k in kinds):
         names = {name for each in kinds for name in each.model_fields}
         must = f"a mapping of {', '.join(sorted(names))}"
-    return SettingError(path, must, first["input"], hint)
+    was = first["input"]
+    return SettingError(path, must, list(was) if isinstance(was, tuple) else was, hint)
 
 
 def _members(value: Any) -> Mapping[str, Any]:
@@ -226,12 +237,6 @@ _MUST = {
     "model_attributes_type": "a mapping",
     "is_instance_of": "a component that is a {class}",
 }
-
-
-def check_range(field: str, limits: tuple[float, float]) -> None:
-    """Check that limits leave room between them."""
-    if not limits[0] < limits[1]:
-        raise SettingError(field, "[least, greatest] with least < greatest", list(limits))
 
 
 def _must(error: Any) -> tuple[str, str]:

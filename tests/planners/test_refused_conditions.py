@@ -10,6 +10,7 @@ from composed import composed
 from evoexp.errors import EvoexpError
 from planners.runs import ran
 
+TESTS = Path(__file__).parents[1]
 LINES: dict[str, dict[str, str]] = yaml.safe_load(
     Path(__file__).with_name("refused_conditions.yaml").read_text()
 )
@@ -21,8 +22,10 @@ LINES: dict[str, dict[str, str]] = yaml.safe_load(
     [(condition, *line) for condition, lines in LINES.items() for line in lines.items()],
 )
 def test_what_cannot_be_is_refused_in_one_line(condition: str, words: str, message: str) -> None:
-    experiment, _, label = condition.partition(": ")
-    chosen = [f"experiment={experiment}"] if experiment else []
+    chosen, _, label = condition.partition(": ")
+    if chosen and "=" not in chosen:
+        chosen = f"experiment={chosen}"
+    given = f"{chosen} {words}".replace("TESTS", str(TESTS))
     with pytest.raises(EvoexpError) as refusal:
-        ran(composed(*chosen, *shlex.split(words), label=label))
+        ran(composed(*shlex.split(given), label=label))
     assert message in str(refusal.value) and "\n" not in str(refusal.value)

@@ -114,23 +114,6 @@ def test_changed_files_are_refused(tmp_path: Path, before: str, after: str, mess
     assert message in str(refusal.value) and "\n" not in str(refusal.value)
 
 
-@pytest.mark.examples(2)
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        ("path=nowhere.urdf", "a file that can be read (no such file or directory)"),
-        ("tool_frame=tool1", "was 'tool1'; did you mean 'tool0'?"),
-        ("tool_frame=base_link", "robot.tool_frame: must be a frame that moves, was 'base_link'"),
-        ("base_frame=tool0", "robot.base_frame: must be a frame that does not move, was 'tool0'"),
-        ("srdf=no.srdf", "robot.srdf: must be a file that can be read"),
-    ],
-)
-def test_frames_and_files_that_are_not_there(override: str, message: str) -> None:
-    with pytest.raises(EvoexpError) as refusal:
-        task(f"robot.{override}").prepare()
-    assert message in str(refusal.value)
-
-
 def spheres(tmp_path: Path, **links: Any) -> Path:
     """Write balls (x, y, z, radius) of links as a URDF."""
     ball = (

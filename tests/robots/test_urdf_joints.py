@@ -139,7 +139,7 @@ def test_planar_joints_of_a_file_stand_or_move(base: str, nq: int, tmp_path: Pat
         assert place.rotation == pytest.approx(about)
 
 
-POSTURES, LEFT = ((*REACH, f"robot.group={group}") for group in ("left_arm", "left"))
+POSTURES = (*REACH, "robot.group=left_arm")
 STRINGS = ("robot=urdf", *TWO[1:], "robot.groups=[left_arm,right_arm]")
 
 
@@ -153,19 +153,6 @@ def test_states_are_start_and_goal_by_their_names() -> None:
     motion = scenario_of(STRINGS, "scenario.q_start=bent", "scenario.q_goal=[bent,[1.0,2.0]]")
     assert motion.q_start[1] == pytest.approx([0.25 / DEGREE, 1.0 / DEGREE])
     assert motion.q_goal == (motion.q_start[0], (1.0, 2.0))
-
-
-@pytest.mark.parametrize(
-    ("base", "override", "message"),
-    [
-        (POSTURES, "q_start=bend", "must be a state that the robot's .* was 'bend'.* 'bent'?"),
-        (LEFT, "q_start=bent", "q_start: must be a state that tells left_finger, was 'bent'"),
-        (STRINGS, "q_goal=[bent]", r"must be one state or list per arm of the robot \(2\)"),
-    ],
-)
-def test_states_that_are_not_there(base: tuple[str, ...], override: str, message: str) -> None:
-    with pytest.raises(EvoexpError, match=message):
-        scenario_of(base, f"scenario.{override}")
 
 
 def test_fields_at_their_defaults_are_no_part_of_the_identity() -> None:
@@ -193,35 +180,6 @@ def test_two_groups_are_two_arms_and_share_the_trunk() -> None:
     assert len(names) == assembly.geometry.ngeoms == 9 and "trunk" in names
     assert frozenset(("chest", "right_upper")) in assembly.disabled
     agrees(assembly, STANDING)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"group": "right_arms"}, "robot.group: must be a group of the SRDF (left_arm, left_gripp"),
-        ({"group": "hollow"}, "robot.group: must be a group with a joint that moves, was 'hollow'"),
-        ({"group": "loop"}, "robot.group: must be a group that does not contain itself, was 'loop"),
-        ({"groups": ["left_arm", "left"]}, "robot.groups: must be groups that have no joint in co"),
-        ({"groups": ["left_arm", "lift"]}, "robot.groups[1]: must be a group of the SRDF"),
-        ({"joints": ["right_elbo"]}, "was 'right_elbo'; did you mean 'right_elbow'?"),
-        ({"joints": ["left_mount"]}, "robot.joints: must be names of joints that move, was"),
-        ({"joints": ["left_coupler"]}, "move of their own, was \"'left_coupler', which follows 'l"),
-        ({"joints": ["left_elbow"], "fixed": {"left_elbow": 1.0}},
-         "robot.fixed.left_elbow: must be left out: this joint moves, was 1.0"),
-        ({"fixed": {"left_elbo": 1.0}, "group": "torso"}, "did you mean 'left_elbow'?"),
-        ({"fixed": {"trunk_lift": 0.4}, "group": "left_arm"},
-         "robot.fixed.trunk_lift: must be within the joint's limits [0.05, 0.3], was 0.4"),
-        ({"fixed": {"left_coupler": 0.4}, "group": "torso"},
-         "robot.fixed.left_coupler: must be left out: this joint follows 'left_elbow'"),
-        ({"group": "left_arm", "joints": ["left_elbow"]}, "robot.joints: must be left out beside"),
-        ({"tool_frame": "trunk", "group": "left_arm"}, "robot.tool_frame: must be a frame that m"),
-        ({"groups": ["left_arm"], "tool_frames": ["a", "b"]}, "robot.tool_frames: must be a frame"),
-    ],
-)  # fmt: skip
-def test_refusals(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(EvoexpError) as refusal:
-        robot(**settings).build()
-    assert message in str(refusal.value) and "\n" not in str(refusal.value)
 
 
 # each follows the one before: multiplier, offset [rad]

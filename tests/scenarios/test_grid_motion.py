@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from evoexp.attachments import File, MissingFile, keep
+from evoexp.attachments import File, keep
 from evoexp.errors import SettingError
 from evoexp.scenarios.grid_motion import GridMotion, blocks, read_map
 
@@ -68,25 +68,6 @@ def test_blocks_and_map_add_up() -> None:
     assert nodes_of(scenario.blocked()) == SEEN | {(1, 1), (2, 1)}
     assert scenario.bodies()[0].size == (1.0, 0.02, 0.5)
     assert scenario.bodies()[0].center == (1.5, 1.0, 0.25)
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"start": (4, 0)}, r"must be a node inside the grid \(0\.\.3 × 0\.\.2\), was \[4, 0\]"),
-        ({"goal": (0, 0)}, "goal: must be another node than start"),
-        ({"goal": (1, 1, 1)}, "goal: must be a node inside"),
-        ({"obstacles": ((0, 0, 1),)}, "obstacles"),
-        ({"obstacles": ((2, 1, 1, 1),)}, r"obstacles\[0\]: must be from a lower to an upper"),
-        ({"obstacles": ((0, 0, 4, 0),)}, r"obstacles\[0\]"),
-        ({"obstacles": ((0, 0, 1, 1),)}, r"scenario\.start: must be a free node; an obstacle"),
-        ({"obstacles": ((3, 2, 3, 2),)}, r"scenario\.goal: must be a free node; an obstacle is"),
-        ({"map": File(sha256="0" * 64)}, "give the file again"),
-    ],
-)
-def test_what_does_not_fit_the_grid_is_refused(changed: dict[str, Any], said: str) -> None:
-    with pytest.raises((SettingError, ValueError, MissingFile), match=said):
-        GridMotion(**(BASE | changed)).blocked()
 
 
 @given(st.sampled_from([(5, 6), (3, 3, 4)]), st.floats(0.0, 1.0), st.integers(0, 2**32))

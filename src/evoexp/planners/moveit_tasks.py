@@ -84,7 +84,7 @@ def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureT
         local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
         pose = frame_pose(assembly.table, tool.joint - 1, local, q_goal)
         place = Pose(pose[:9].reshape(3, 3), pose[9:])
-        link = LinkGoal("", place, task.position_tolerance, task.angle_tolerance)
+        link = LinkGoal(place, task.position_tolerance, task.angle_tolerance)
     x, y, z = link.pose.position.tolist()
     goal: PoseGoal | PointGoal = PointGoal(kind="point", point=(x, y, z))
     if link.angle is not None:

@@ -11,7 +11,7 @@ from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import ArmParts, Chain, Link, Tool
 from evoexp.robots.bodies import AnyBody, Point3, body_geometry, placed
-from evoexp.validation import Settings, check_range
+from evoexp.validation import Limits, Settings
 
 
 class DhJoint(Settings):
@@ -23,7 +23,7 @@ class DhJoint(Settings):
     # a, α, d, θ at q = 0 [length unit, deg, length unit, deg]
     dh: tuple[float, float, float, float]
     # least and greatest value of the joint [deg], of a sliding one [length unit]
-    limits: tuple[float, float]
+    limits: Limits
     kind: Literal["revolute", "prismatic"] = "revolute"  # whether θ or d is what moves
 
     def behind(self) -> Any:
@@ -55,8 +55,6 @@ class DhChain(Chain):
 
     @model_validator(mode="after")
     def _bodies_fit(self) -> Self:
-        for k, joint in enumerate(self.joints):
-            check_range(f"joints[{k}].limits", joint.limits)
         names = [body.name for body in self.bodies]
         for k, body in enumerate(self.bodies):
             if body.joint > len(self.joints):

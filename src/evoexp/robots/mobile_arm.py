@@ -12,9 +12,8 @@ from pydantic import model_validator
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import ArmParts, Chain, Link, link_capsule
-from evoexp.validation import NonNegative, Positive, check_range
+from evoexp.validation import Limits, NonNegative, Positive
 
-Range = tuple[float, float]
 NUM_JOINTS = 3  # of the arm
 
 
@@ -32,15 +31,12 @@ class MobileArm(Chain):
     platform_size: tuple[Positive, Positive]
     link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
     # least and greatest θ1, θ2, θ3 within ±180° [deg]; None: any angle (Eq. 7)
-    joint_limits: tuple[Range, Range, Range] | None = None
+    joint_limits: tuple[Limits, Limits, Limits] | None = None
     # least and greatest τ1, τ2, τ3; None: any torque (Eq. 9)
-    torque_limits: tuple[Range, Range, Range] | None = None
+    torque_limits: tuple[Limits, Limits, Limits] | None = None
 
     @model_validator(mode="after")
-    def _limits_have_an_inside(self) -> Self:
-        for name in ("joint_limits", "torque_limits"):
-            for k, limits in enumerate(getattr(self, name) or ()):
-                check_range(f"{name}[{k}]", limits)
+    def _is_longer_than_high(self) -> Self:
         length, height = self.platform_size
         if length <= height:
             must = "[length, height] with length > height"

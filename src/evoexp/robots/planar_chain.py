@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.robots.assembly import ArmParts, Chain, Link
-from evoexp.validation import NonNegative, Positive, check_range
+from evoexp.validation import Limits, NonNegative, Positive
 
 Point2 = tuple[float, float]
 
@@ -26,16 +26,14 @@ class PlanarChain(Chain):
     link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
     tool_radius: NonNegative = 0.0  # of a ball around the tip; 0: none
     # least and greatest angle of every joint [rad], as the papers print them; None: any angle
-    joint_limits: tuple[tuple[float, float], ...] | None = None
+    joint_limits: tuple[Limits, ...] | None = None
 
     @model_validator(mode="after")
     def _limits_fit(self) -> Self:
-        limits_of = self.joint_limits or ()
-        if self.joint_limits is not None and len(limits_of) != len(self.link_lengths):
+        limits = self.joint_limits
+        if limits is not None and len(limits) != len(self.link_lengths):
             must = f"one pair per link ({len(self.link_lengths)})"
-            raise SettingError("joint_limits", must, len(limits_of))
-        for k, limits in enumerate(limits_of):
-            check_range(f"joint_limits[{k}]", limits)
+            raise SettingError("joint_limits", must, len(limits))
         return self
 
     def append_to(self, model: Any, arm: int) -> ArmParts:

@@ -7,11 +7,11 @@ from pydantic import Field
 
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.scenarios.obstacles import Obstacle
-from evoexp.validation import Component, NonNegative, Vector
+from evoexp.scenarios.obstacles import SceneTask
+from evoexp.validation import NonNegative, Vector
 
 
-class ArmMotion(Component):
+class ArmMotion(SceneTask):
     """Start and goal of every arm, and the obstacles around them."""
 
     component: ClassVar[str] = "arm_motion"
@@ -19,9 +19,6 @@ class ArmMotion(Component):
     # configuration of every arm at the start, arm by arm [deg]
     q_start: Annotated[tuple[Vector, ...], Field(min_length=1)]
     q_goal: Annotated[tuple[Vector, ...], Field(min_length=1)]  # at the goal [deg]
-    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
-    length_unit: str  # name of the scene's unit of length
-    obstacles: tuple[Obstacle, ...] = ()  # what does not move
     # clearance that the task requires between a link and an obstacle; None: the security
     # margin, as between two arms
     obstacle_margin: NonNegative | None = None

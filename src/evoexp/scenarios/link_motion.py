@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, acos, atan2
 from evoexp.records import FloatArray
-from evoexp.scenarios.obstacles import Obstacle
-from evoexp.validation import Component, NonNegative, Settings, Vector
+from evoexp.scenarios.obstacles import SceneTask
+from evoexp.validation import Settings, Vector
 
 HALF_TURN = 180.0  # [deg] genes live in [0, π)
 ROUNDING = 2.0**-48  # [-] more than the relative errors of what `_reach` computes
@@ -53,7 +53,7 @@ class Posture(Settings):
         return angles
 
 
-class LinkMotion(Component):
+class LinkMotion(SceneTask):
     """Start and goal of every robot, and the obstacles around them."""
 
     component: ClassVar[str] = "link_motion"
@@ -63,9 +63,6 @@ class LinkMotion(Component):
     q_goal: Annotated[tuple[Posture, ...], Field(min_length=2)]  # at the goal
     # robots (counted from 0) that keep their start posture; their goal must be the same
     stationary: tuple[int, ...] = ()
-    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
-    length_unit: str  # name of the scene's unit of length
-    obstacles: tuple[Obstacle, ...] = ()  # what does not move
 
     def ends(self, bases: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return link angles of all robots at start and goal, each (robots, 2) [deg].

@@ -51,7 +51,6 @@ _paths: dict[str, str] = {}  # SHA-256 of a file → its path as it was given, f
 class LinkGoal(NamedTuple):
     """Where a link shall be."""
 
-    link: str  # its name
     pose: Pose  # in the root frame; of a goal without orientation only the position counts
     distance: float  # tolerance [m]
     angle: float | None  # tolerance [deg]; None: any orientation will do
@@ -246,4 +245,4 @@ def read_link_goal(request: MessagePart, frames: Frames) -> LinkGoal:
         turn.require(least > 0.0, f"tolerances above 0 of '{link}'", least)
         pose = Pose(turned.rotation, pose.position)
         angle = least / DEGREE if least / DEGREE < HALF_TURN else None
-    return LinkGoal(link, pose._replace(position=pose.of_point(-offset)), distance, angle)
+    return LinkGoal(pose._replace(position=pose.of_point(-offset)), distance, angle)

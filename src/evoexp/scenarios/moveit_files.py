@@ -28,27 +28,19 @@ KINDS = ("", "box", "sphere", "cylinder", "cone", "prism")  # numbered as in Sol
 MOST_NESTED, MOST_VALUES = 30, 200_000
 MUST = "YAML as MoveIt writes it"
 ECHO = "; ros2 topic echo --once --full-length TOPIC writes it as YAML"
-IN_RVIZ = f"; load it in RViz: {ECHO[2:]}"
-# how files of other formats begin, and what to do about it
-FORMATS = (
-    (rb"\s*\Z", "an empty file", ""),
-    (rb"version https://git-lfs", "a pointer of Git LFS", "; git lfs pull brings the file"),
-    (rb"#ROSBAG V|SQLite format 3\0|\x89MCAP", "a bag", f"; play it: {ECHO[2:]}"),
-    (rb"# Octomap", "an octomap", "; evoexp knows objects of primitives and meshes only"),
-    (rb"\s*<(!doctype )?html", "an HTML page", "; download the file itself"),
-    (rb"\s*<[?!\w]", "XML", ""),
-    (rb"\x1f\x8b|PK\x03\x04|BZh|\xfd7zXZ", "a compressed file", "; unpack it"),
-    (rb"[^\n]*\n\s*(\*\s|\.\s*\Z)", "MoveIt's text format (.scene)", IN_RVIZ),
-    (rb"[^\0]*\0", "a binary file", ""),
-)
 CUT_OFF = re.compile(r"\.\.\.|<(sequence|array) type: .*>")  # as `topic echo` shortens lists
+
+
+MESSAGES = yaml.load(
+    Path(__file__).with_name("moveit_messages.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader
+)
+FORMATS = MESSAGES.pop("formats")  # how files of other formats begin, and what to do about it
 
 
 def _read_fields() -> dict[str, dict[str, str]]:
     """Return message → field → the message in it, or what is done with its value."""
-    text = Path(__file__).with_name("moveit_messages.yaml").read_text(encoding="utf-8")
-    messages, fields = yaml.load(text, yaml.CSafeLoader), dict[str, dict[str, str]]()
-    for message, rows in messages.items():
+    fields = dict[str, dict[str, str]]()
+    for message, rows in MESSAGES.items():
         uses = ((use, rows.pop(use, "")) for use in USES)
         fields[message] = {name: use for use, names in uses for name in names.split()} | rows
     return fields
@@ -238,9 +230,9 @@ def read_document(content: bytes, field: str, message: str) -> MessagePart:
         must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
         raise SettingError(field, must, f"{len(content) / MEGABYTE:.1f} MB")
     content = content.removeprefix(b"\xef\xbb\xbf")
-    for begins, name, hint in FORMATS:
-        if re.match(begins, content, re.IGNORECASE):
-            raise SettingError(field, MUST, name, hint)
+    for form in FORMATS:
+        if re.match(form["begins"].encode(), content, re.IGNORECASE):
+            raise SettingError(field, MUST, form["name"], form.get("hint", ""))
     try:
         _check(content, field)
         roots = [root for root in yaml.load_all(content, _Loader) if root is not None]

@@ -8,7 +8,7 @@ from pydantic import Field
 from evoexp.errors import SettingError
 from evoexp.numeric.ordered_sums import length, matrix_product, rotation_matrix
 from evoexp.records import FloatArray
-from evoexp.validation import Positive, Settings
+from evoexp.validation import Component, NonNegative, Positive, Settings
 
 Point = Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
 """(x, y), with z = 0, or (x, y, z) [length unit of the scene]."""
@@ -100,6 +100,14 @@ Obstacle = Annotated[
     SphereObstacle | BoxObstacle | RodObstacle | HalfSpaceObstacle | EllipseObstacle | HullObstacle,
     Field(discriminator="shape"),
 ]
+
+
+class SceneTask(Component):
+    """Base of tasks among obstacles."""
+
+    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
+    length_unit: str  # name of the scene's unit of length
+    obstacles: tuple[Obstacle, ...] = ()  # what does not move
 
 
 class ObstacleTable(NamedTuple):

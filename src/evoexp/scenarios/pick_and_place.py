@@ -1,16 +1,16 @@
 """An arm whose tip shall pass a via point and end at a goal point inside a box, among obstacles."""
 
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from evoexp.scenarios.obstacles import Obstacle, ObstacleTable, obstacle_table
-from evoexp.validation import Component, NonNegative, Vector, check_range
+from evoexp.scenarios.obstacles import ObstacleTable, SceneTask, obstacle_table
+from evoexp.validation import Limits, Vector
 
 Point2 = tuple[float, float]
 
 
-class PickAndPlace(Component):
+class PickAndPlace(SceneTask):
     """Start posture, via point and goal point of a planar arm's tip (Lavoie & Boudreau 2001, 4)."""
 
     component: ClassVar[str] = "pick_and_place"
@@ -20,20 +20,10 @@ class PickAndPlace(Component):
     # where the tip shall be at the end of the first sub-path (x, y) [length unit]
     via_point: Point2
     goal_point: Point2  # where it shall be at the end of the second one
-    # least and greatest x of the box in which the tip must be at the end of the second sub-
-    # path
-    box_x: Point2
-    box_y: Point2  # the same of y
+    # of the box in which the tip must be at the end of the second sub-path
+    box_x: Limits
+    box_y: Limits
     obstacle_shift: Point2  # by how much obstacles and box are moved together (dx, dy)
-    security_margin: NonNegative  # clearance between bodies that the task requires
-    length_unit: str  # name of the scene's unit of length
-    obstacles: tuple[Obstacle, ...] = ()  # what does not move
-
-    @model_validator(mode="after")
-    def _box_has_an_inside(self) -> Self:
-        for name in ("box_x", "box_y"):
-            check_range(name, getattr(self, name))
-        return self
 
     @property
     def box(self) -> tuple[float, float, float, float]:

@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError, nearest
-from evoexp.scenarios.obstacles import Obstacle
-from evoexp.validation import Component, NonNegative, Positive, Settings, Vector
+from evoexp.scenarios.obstacles import Obstacle, SceneTask
+from evoexp.validation import NonNegative, Positive, Settings, Vector
 
 Point3 = tuple[float, float, float]
 
@@ -86,8 +86,8 @@ class Phase(Settings):
     scope_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
 
 
-class PostureTask(Component):
-    """Start posture, phases and surroundings of one arm."""
+class PostureTask(SceneTask):
+    """Start posture, phases and surroundings of one arm; obstacles may be grasped."""
 
     component: ClassVar[str] = "posture_task"
 
@@ -99,11 +99,8 @@ class PostureTask(Component):
     position_tolerance: Positive  # A goal is met this close [length unit]
     angle_tolerance: Positive  # and with orientations this close [deg]
     up: Point3 = (0.0, 0.0, 1.0)  # the direction that counts as up
-    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
-    length_unit: str  # name of the scene's unit of length
     # whether a goal that no posture can reach is refused; false: it is searched all the same
     check_reach: bool = True
-    obstacles: tuple[Obstacle, ...] = ()  # what stands around, things to be grasped included
     # how deep pairs that may touch may overlap; None where no phase has such pairs [length
     # unit]
     allowed_penetration: Positive | None = None

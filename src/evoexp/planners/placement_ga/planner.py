@@ -32,7 +32,7 @@ from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
-from evoexp.validation import Component, check_range
+from evoexp.validation import Component, Limits
 
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
@@ -58,7 +58,7 @@ class PlacementGa(PlannerDefaults, Component):
     component: ClassVar[str] = "placement_ga"
     revision: ClassVar[int] = 2
 
-    angle_range: tuple[float, float]  # least and greatest θ1 and θ2 that genes stand for [deg]
+    angle_range: Limits  # least and greatest θ1 and θ2 that genes stand for [deg]
     # of either angle; both ends of the range are values [-]
     bits_per_gene: Annotated[int, Field(ge=1, le=52)]
     coding: Literal["binary", "gray"]  # plain binary numbers, or Gray codes
@@ -75,7 +75,6 @@ class PlacementGa(PlannerDefaults, Component):
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
         """Build the robot and check that the end-effector can reach its target."""
-        check_range("planner.angle_range", self.angle_range)
         reach = sum(robot.link_lengths)
         if abs(scenario.target[1]) > reach:
             must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "

@@ -69,7 +69,7 @@ def test_a_stored_run_has_its_files(path: Path, tmp_path: Path) -> None:
     run.create(condition.to_json(), {}, condition.files())
     forget()
     with pytest.raises(MissingFile, match="give the file again"):
-        Condition.from_json(condition.to_json()).prepare()
+        _ = condition.scenario.map.content
     again = Condition.from_json(run.config_json())
     assert again.prepare().problem.fields.grid.free.sum() == 14
 

@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError
 from evoexp.scenarios import obstacles
-from evoexp.scenarios.obstacles import obstacle_table, rotation_matrix
+from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table, rotation_matrix
 from obstacle_samples import box, capsule, cylinder, ellipse, half_space, sphere
 
 ONE_OF_EACH = (
@@ -60,3 +61,10 @@ def test_settings_are_read_from_plain_data() -> None:
     found = adapter.validate_python(data)
     assert found == cylinder(data["start"], data["end"], 1.0)
     assert found.canonical() == data | {"start": [0.0, 0.0], "end": [0.0, 0.1]}
+
+
+def test_a_hull_without_a_volume_is_refused_where_it_slants() -> None:
+    points = ((0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
+    slanted = (obstacles.HullObstacle(shape="hull", points=points),)
+    with pytest.raises(SettingError, match=r"scenario\.obstacles\[0\]\.points: .* no plane"):
+        obstacle_shapes(obstacle_table(slanted), obstacle_hulls(slanted))

@@ -1,6 +1,8 @@
 """`evoexp new` writes a package that is found, runs, and keeps its obligations."""
 
+import json
 import re
+import shutil
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,8 +12,10 @@ import pytest
 from command_samples import Evoexp, exit_code
 
 from evoexp.batch.replicate import run_replicate
+from evoexp.configuration.search_path import find, options
 from evoexp.evolution.operators.operator import Crossover
 from evoexp.registry import component_class
+from evoexp.store.log_reader import read_log
 from evoexp.testing import CHECKS, Check, check_operator, conditions
 from guests import on_path, write_distribution
 from test_house import NUMBER, SOURCE
@@ -27,12 +31,16 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory / NAME
 
 
+def entry_points(package: Path) -> dict[str, dict[str, str]]:
+    """Return the entry points that a package's pyproject.toml declares, by their groups."""
+    points = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
+    return {group.removeprefix("evoexp."): names for group, names in points.items()}
+
+
 @pytest.fixture(scope="module")
 def installed(package: Path) -> Iterator[None]:
-    """Have the package on the path with the entry points that its pyproject.toml declares."""
-    points = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
-    groups = {group.removeprefix("evoexp."): names for group, names in points.items()}
-    write_distribution(package / "src", NAME, "0.1.0", **groups)
+    """Have the package on the path with its entry points."""
+    write_distribution(package / "src", NAME, "0.1.0", **entry_points(package))
     with on_path(package / "src"):
         yield
 
@@ -63,14 +71,63 @@ def test_it_keeps_a_planners_obligations(check: Check, label: str) -> None:
     check(found[label])
 
 
+PAGE = """
+from evoexp.report.pages.generic import page as generic
+
+def page(results, settings):
+    print("the guest's page")
+    return generic(results, settings)
+"""
+
+
+@pytest.mark.usefixtures("wide_terminal")
+def test_its_runs_are_recorded_reproduced_and_reported_under_its_name(
+    evoexp: Evoexp, outputs: Path, tmp_path: Path
+) -> None:
+    name = "mu_search"
+    assert exit_code("new", "planner", name, "--directory", str(tmp_path)) == 0
+    site = tmp_path / name / "src"
+    (site / name / "page.py").write_text(PAGE)
+    report = Path(find("report", "paper").path).read_text()
+    (site / name / "conf" / "report").mkdir()
+    own = report.replace("figures: null", f"figures: {name}_page")
+    (site / name / "conf" / "report" / f"{name}.yaml").write_text(own)
+    points = entry_points(tmp_path / name) | {"pages": {f"{name}_page": f"{name}.page:page"}}
+    write_distribution(site, name, "0.3", **points)
+    with on_path(site):
+        assert find("planner", name).origin == find("experiment", name).origin == f"{name} 0.3"
+        assert {name, "rana_planar"} <= set(options("experiment"))
+        words = (f"report={name}", "budget=smoke", "num_replicates=1", "runner=serial")
+        assert (
+            "the guest's page" in evoexp("run", f"experiment={name}", "--only", "λ = 4", *words).out
+        )
+        (log,) = outputs.glob("runs/*/replicates/*.mcap")
+        manifest = json.loads((log.parents[1] / "manifest.json").read_text())
+        components = manifest["components"]
+        assert components == read_log(log).environment["components"]
+        assert components == dict.fromkeys((name, f"{name}_settings"), f"{name} 0.3")
+        assert manifest["options"]["planner"] == {"name": name, "origin": f"{name} 0.3"}
+        assert manifest["options"]["collision"] == {"name": "rana_planar", "origin": "evoexp"}
+        assert evoexp("reproduce", str(log)).code == 0
+    # another version is said, and compared
+    shutil.rmtree(site / f"{name}-0.3.dist-info")
+    write_distribution(site, name, "0.4", **points)
+    with on_path(site):
+        assert evoexp("reproduce", str(log)).code == 0
+    # without the package, its name is said
+    shutil.rmtree(site / f"{name}-0.4.dist-info")
+    with on_path(site):
+        said = evoexp("reproduce", str(log))
+    missing = f"needs {name} 0.3, which is not installed"
+    assert (said.code, said.err) == (2, f"evoexp: {log}: {missing}\n")
+
+
 def test_an_operator_enters_the_planners_of_the_papers(evoexp: Evoexp, tmp_path: Path) -> None:
     assert exit_code("new", "operator", "half_swap", "--directory", str(tmp_path)) == 0
     package = tmp_path / "half_swap"
     for path in (path for path in package.rglob("*") if path.is_file()):
         assert not re.search("my_operator|MyOperator", f"{path}{path.read_text()}")
-    points = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
-    components = points["evoexp.components"]
-    write_distribution(package / "src", "half_swap", "0.1.0", components=components)
+    write_distribution(package / "src", "half_swap", "0.1.0", **entry_points(package))
     with on_path(package / "src"):
         check_operator(cast(Crossover, component_class("half_swap")()))
         for experiment in ("rana_planar", "curkovic_methods", "lavoie_7dof"):

@@ -14,6 +14,9 @@ from evoexp.scenarios.moveit_files import REQUEST, SCENE, MessagePart, read_docu
 from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world
 from evoexp.testing import conditions
 
+SAMPLES = Path(__file__).parent / "scenarios"
+REFUSED_MESSAGES = yaml.safe_load((SAMPLES / "refused_messages.yaml").read_text(encoding="utf-8"))
+
 # three turning joints, a passive finger that slides, and one that a URDF left as fixed
 URDF = """<robot name="small">
   <link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>

@@ -18,6 +18,7 @@ from evoexp.scenarios.obstacles import BOX, obstacle_table
 from moveit_samples import (
     GOAL,
     JOINTS,
+    REFUSED_MESSAGES,
     START,
     body,
     document,
@@ -112,59 +113,11 @@ def test_quaternions_are_normalised_within_a_hundredth_and_refused_beyond(length
         assert np.allclose(box.rotation, [0.0, 0.0, 90.0], atol=1e-9)
 
 
-def matrix(names: str, *rows: list[Any]) -> dict[str, Any]:
-    return {"allowed_collision_matrix": {"entry_names": [*names], "entry_values": list(rows)}}
-
-
-def state(**changes: Any) -> dict[str, Any]:
-    return {"robot_state": changes}
-
-
-CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-PRISM = {"type": "prism", "dimensions": [1, 1]}
-FLOOR = {"id": "floor", "planes": [{"coef": [0, 0, 0, -1]}], "plane_poses": [{}]}
-KINDS = "primitives that are box, .*, was"
-REFUSED = [
-    ("attached objects", state(attached_collision_objects=[{"link_name": "x"}])),
-    ("octomaps", {"world": {"octomap": {"octomap": {"data": [1]}}}}),
-    ("link_padding", {"link_padding": [{"link_name": "x", "padding": 0.01}]}),
-    ("link_scale", {"link_scale": [{"link_name": "x", "scale": 1.1}]}),
-    ("a part of 3 vertices in one plane", scene(mesh(CORNERS, [[0, 1, 2]]))),
-    ("three of the 3 vertices of 'thing', counted from 0, was '0, 1, 3'",
-     scene(mesh(CORNERS, [[0, 1, 3]]))),
-    ("counted from 0, was '0.0, 1.0, 1.5'|counted from 0, was '0, 1, 1.5'",
-     scene(mesh(CORNERS, [[0, 1, 1.5]]))),
-    (r"a normal other than 0 of 'floor', was \[0.0, 0.0, 0.0\]", scene(FLOOR)),
-    ("a pose per mesh", scene(mesh(CORNERS, [[0, 1, 2]], mesh_poses=[]))),
-    ("a prism", scene({"id": "c", "primitives": [PRISM], "primitive_poses": [{}]})),
-    ("frame that stands still", solid(header={"frame_id": "hand"})),
-    ("dimensions above 0", solid("box", [1, 0, 1])),
-    (r"1 numbers at 'thing'.primitives\[0\].dimensions, was 3", solid("sphere", [0.1, 0, 0])),
-    (r"2 numbers at 'thing'.primitives\[0\].dimensions, was 1", solid("cone", [0.1])),
-    (r"3 numbers at 'thing'.primitives\[0\].dimensions, was 2", solid("box", [0.1, 0.2])),
-    (r"3 numbers at 'thing'.primitive_poses\[0\].position, was 2", solid(position=[0, 0])),
-    *((rf'{KINDS} "\'thing\', a {named}"', solid(kind))
-      for kind, named in ((None, "none"), (True, "true"), (7, "7"), ([1], r"\[1\]"))),
-    ("a pose per primitive", scene({"id": "x", "primitives": [PRISM]})),
-    (r"a pose per primitive of 'thing' \(1\), was 2", solid(primitive_poses=[{}, {}])),
-    ("objects with a body each, was \"'x' without one\"", scene({"id": "x"})),
-    ("ids differ", scene(body("sphere", [1], [0, 0, 0]), body("sphere", [1], [0, 0, 0]))),
-    *((rf"'thing'.operation ADD \(0\), was {was}", solid(operation=operation))
-      for operation, was in ((1, "'REMOVE'"), (3, "'MOVE"), ("\2", "'APPEND'"), (9, "9"))),
-    ("at the origin", state(multi_dof_joint_state={"transforms": [{"translation": [1, 0, 0]}]})),
-    (r"one position of 'j' at robot_state.joint_state, was \[1.0, 2.0\]",
-     state(joint_state={"name": ["j", "j"], "position": [1, 2]})),
-    ("finite numbers", solid("sphere", [float("nan")])),
-    ("truth values", matrix("a", [2])),
-    (r"symmetric .*, was \"two values of '.' and '.'\"", matrix("ab", [False, True], [False] * 2)),
-    ("symmetric", matrix("aba", [False, True, False], [True, False, False], [False] * 3)),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("named", "plain"), REFUSED)
-def test_what_is_not_known_is_refused_by_its_name(named: str, plain: Any) -> None:
+@pytest.mark.parametrize(("named", "plain"), REFUSED_MESSAGES["scenes"].items())
+def test_what_is_not_known_is_refused_by_its_name(named: str, plain: dict[str, Any]) -> None:
+    objects = plain.get("objects", [])
     with pytest.raises(SettingError, match=named) as refusal:
-        read(plain)
+        read(scene(*objects, **{key: plain[key] for key in plain.keys() - {"objects"}}))
     assert str(refusal.value).startswith("scenario.scene: ")
     assert "\n" not in str(refusal.value)
 
@@ -193,20 +146,14 @@ def test_a_request_names_group_start_and_goal() -> None:
     assert not found.link
 
 
-def link_goal(turn: Any = (0, 0, 0, 1), tolerance: float = 0.1, **region: Any) -> dict[str, Any]:
-    box = {"type": "box", "dimensions": [0.02, 0.04, 0.06]}
-    whole = {"primitives": [box], "primitive_poses": [{"position": [0.4, 0.1, 0.5]}]} | region
-    place = {"target_point_offset": [0.1, 0, 0], "constraint_region": whole}
-    tolerances = {f"absolute_{axis}_axis_tolerance": tolerance for axis in "xyz"}
-    oriented = {"link_name": "tip", "orientation": list(turn), **tolerances}
-    return {
-        "position_constraints": [place | {"link_name": "tip"}],
-        "orientation_constraints": [oriented],
-    }
-
-
 def test_a_pose_of_a_link_has_the_tolerances_of_its_constraints() -> None:
-    found, goal = asked(goal_constraints=[link_goal([0, 0, HALF, HALF])])
+    box = {"type": "box", "dimensions": [0.02, 0.04, 0.06]}
+    region = {"primitives": [box], "primitive_poses": [{"position": [0.4, 0.1, 0.5]}]}
+    place = {"target_point_offset": [0.1, 0, 0], "constraint_region": region}
+    tolerances = {f"absolute_{axis}_axis_tolerance": 0.1 for axis in "xyz"}
+    turn = {"link_name": "tip", "orientation": [0, 0, HALF, HALF], **tolerances}
+    places = {"position_constraints": [place | {"link_name": "tip"}]}
+    found, goal = asked(goal_constraints=[places | {"orientation_constraints": [turn]}])
     assert (found.link, goal.distance) == ("tip", 0.01)
     assert goal.angle == pytest.approx(0.1 / DEGREE)
     # the point 0.1 along the link's x axis is the goal, and that axis points along y
@@ -214,25 +161,11 @@ def test_a_pose_of_a_link_has_the_tolerances_of_its_constraints() -> None:
     assert np.allclose(goal.pose.angles, [0.0, 0.0, 90.0])
 
 
-@pytest.mark.parametrize(
-    ("part", "value", "named"),
-    [
-        ("path_constraints", {"joint_constraints": [{"joint_name": "x"}]}, "path constraints"),
-        ("path_constraints", {"orientation_constraints": [{"link_name": "x"}]}, "path constraints"),
-        ("trajectory_constraints", {"constraints": [{"name": "x"}]}, "trajectory constraints"),
-        ("goal_constraints", [], "one goal"),
-        ("goal_constraints", [{}], "a goal of joints, or of one position"),
-        ("goal_constraints", [{"visibility_constraints": [{"a": 1}]}], "visibility constraints"),
-        ("goal_constraints", [link_goal(tolerance=0.0)], "tolerances above 0"),
-        ("goal_constraints", [link_goal(meshes=[{"vertices": [1]}])], "goals within meshes"),
-        ("goal_constraints", [{"position_constraints": [{}]}], "a goal of a link"),
-        ("start_state", {"joint_state": {"name": ["a"], "position": []}}, "1 numbers"),
-        ("start_state", {"attached_collision_objects": [{"a": 1}]}, "attached objects"),
-    ],
-)
-def test_requests_that_are_not_known_are_refused(part: str, value: Any, named: str) -> None:
+@pytest.mark.parametrize("changes", REFUSED_MESSAGES["requests"], ids=lambda row: row["named"])
+def test_requests_that_are_not_known_are_refused(changes: dict[str, Any]) -> None:
+    named = changes["named"]
     with pytest.raises(SettingError, match=named) as refusal:
-        asked(**{part: value})
+        asked(**{part: changes[part] for part in changes.keys() - {"named"}})
     assert str(refusal.value).startswith("scenario.request: ")
 
 

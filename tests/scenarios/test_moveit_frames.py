@@ -23,6 +23,7 @@ from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table
 from evoexp.testing import conditions
 from moveit_samples import (
     COVERED,
+    REFUSED_MESSAGES,
     body,
     mesh,
     obstacles_of,
@@ -120,7 +121,7 @@ def random_objects(rng: np.random.Generator, frames: list[str]) -> list[dict[str
 
 def moved(name: str, child: str, *place: float, **transform: Any) -> dict[str, Any]:
     """Return a transform of `fixed_frame_transforms`."""
-    plain = {"translation": list(place or (0, 0, 0)), "rotation": [0, 0, 0, 1]} | transform
+    plain = {"translation": [*place, 0, 0, 0][:3], "rotation": [0, 0, 0, 1]} | transform
     return {"header": {"frame_id": name}, "child_frame_id": child, "transform": plain}
 
 
@@ -150,28 +151,6 @@ def test_every_object_stands_where_moveit_puts_it(planning: str, seed: int, tmp_
 
 
 SELF = moved("world", "world")
-REFUSED = {
-    "a transform twice": ([SELF, moved("a", "world", 1, 0, 0), moved("a", "world", 2, 0, 0)],
-        "", r"one transform of 'a' in fixed_frame_transforms, was 'at \(1, 0, 0\) m"),
-    "a chain": ([SELF, moved("a", "world", 1, 0, 0), moved("b", "a", 1, 0, 0)],
-        "b", r"one planning frame for all of fixed_frame_transforms, the child_frame_id 'world'"),
-    "the wrong way round, as in tf": ([moved("world", "camera", 1, 0, 0)],
-        "camera", r"child_frame_id is the planning frame \(base, world\), was 'camera'"),
-    "a planning frame that moves": ([moved("tip", "tip")],
-        "tip", r"child_frame_id is the planning frame \(base, world\), was 'tip'"),
-    "a planning frame away from itself": ([moved("world", "world", 1, 0, 0)],
-        "", r"a frame other than 'world' at fixed_frame_transforms\[0\]\.header\.frame_id"),
-    "a transform to no frame": ([moved("a", "", 1, 0, 0)],
-        "", r"the planning frame at fixed_frame_transforms\[0\]\.child_frame_id, was ''"),
-    "a link elsewhere": ([SELF, moved("base", "world", 1, 0, 0)],
-        "", r"transform of 'base' is that of the robot's link.*; the link stands at \(0, 0, 0\)"),
-    "a link that moves": ([SELF], "tip", r"stands still \(base, world\) at 'o', was \"'tip', a"),
-    "an unknown frame": ([SELF, moved("shelf", "world")],
-        "shelv", r"stands still \(base, world, shelf\) at 'o', was 'shelv'; did you mean 'shelf'"),
-    "a world that is not the planning frame": ([moved("base", "base")],
-        "world", r"stands still \(base\) at 'o', was 'world'"),
-    "another object": ([SELF], "o", r"stands still \(base, world\) at 'o', was 'o'"),
-}  # fmt: skip
 
 
 def ball(frame: str, *transforms: dict[str, Any]) -> dict[str, Any]:
@@ -180,11 +159,12 @@ def ball(frame: str, *transforms: dict[str, Any]) -> dict[str, Any]:
     return scene(thing, fixed_frame_transforms=list(transforms))
 
 
-@pytest.mark.parametrize("case", REFUSED)
+@pytest.mark.parametrize("case", REFUSED_MESSAGES["frames"])
 def test_frames_that_would_be_guessed_are_refused(case: str, tmp_path: Path) -> None:
-    transforms, frame, named = REFUSED[case]
-    with pytest.raises(SettingError, match=named) as refusal:
-        problem(tmp_path, ball(frame, *transforms)).prepare()
+    row = REFUSED_MESSAGES["frames"][case]
+    transforms = [moved(*each) for each in row["transforms"]]
+    with pytest.raises(SettingError, match=row["named"]) as refusal:
+        problem(tmp_path, ball(row["ball"], *transforms)).prepare()
     line = str(refusal.value)
     assert line.startswith(f"scenario.scene: {tmp_path}") and "\n" not in line
 

@@ -7,6 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 from evoexp.errors import SettingError
 from robots.robot_samples import urdf_of
@@ -26,6 +27,15 @@ def arm(
     )
 
 
+SAMPLES = yaml.safe_load(Path(__file__).with_name("urdf_samples.yaml").read_text(encoding="utf-8"))
+
+
+def written(parts: dict[str, str]) -> str:
+    """Write an arm of some parts, or the whole text that is one of them."""
+    filled = {name: part.replace("BOX", BOX) for name, part in parts.items() if name != "said"}
+    return filled["text"] if "text" in filled else arm(**filled)
+
+
 def collision(shape: str, origin: str = "") -> str:
     return f"<collision>{origin}<geometry>{shape}</geometry></collision>"
 
@@ -34,72 +44,22 @@ def bodies(folder: Path, text: str) -> dict[str, Any]:
     return {item.name: item for item in urdf_of(folder, text).build().geometry.geometryObjects}
 
 
-SHAPES = "one of box, sphere, cylinder, capsule, mesh in a <geometry>"
-REFUSED = {
-    "an unknown shape": (collision('<ellipsoid radii="1 1 2"/>') + BOX, SHAPES),
-    "no shape": (collision("") + BOX, SHAPES),
-    "two shapes": (collision('<sphere radius="1"/><box size="1 1 1"/>'), SHAPES),
-    "a shape twice": (collision('<sphere radius="1"/><sphere radius="1"/>'), "one <sphere>"),
-    "no geometry": (f"<collision/>{BOX}", "a <geometry> in a <collision>"),
-    "two geometries": (BOX.replace("</coll", "<geometry/></coll"), "one of box"),
-    "a position of two": (collision('<box size="1 1 1"/>', '<origin xyz="1 0"/>'), "three numbers"),
-    "a position of none": (collision('<box size="1 1 1"/>', '<origin xyz=""/>'), "three numbers"),
-    "two origins": (collision('<box size="1 1 1"/>', "<origin/><origin/>"), "one <origin>"),
-    "an attribute misspelt": (collision('<box size="1 1 1"/>', '<origin xzy="1 0 0"/>'), "'xyz'?"),
-    "an element misspelt": (collision('<box size="1 1 1"/>', "<orgin/>"), "did you mean 'origin'?"),
-    "a collision misspelt": (BOX.replace("collision", "Collision"), "did you mean 'collision'?"),
-    "a quaternion": (collision('<box size="1 1 1"/>', '<origin quat_xyzw="0 0 0 1"/>'), "rpy in"),
-    "NaN": (collision('<box size="1 1 1"/>', '<origin xyz="nan 0 0"/>'), "finite numbers"),
-    "infinity": (collision('<sphere radius="inf"/>'), "finite numbers"),
-    "a large number": (collision('<sphere radius="1e9"/>'), "finite numbers, at most 1e+07"),
-    "a decimal comma": (collision('<sphere radius="0,1"/>'), "finite numbers"),
-    "an underscore": (collision('<sphere radius="1_0"/>'), "finite numbers"),
-    "a negative radius": (collision('<sphere radius="-1"/>'), "numbers greater than 0"),
-    "a flat box": (collision('<box size="1 1 0"/>'), "numbers greater than 0"),
-    "no radius": (collision("<sphere/>"), "radius in a <sphere>"),
-    "no name of a mesh": (collision("<mesh/>"), "filename in a <mesh>"),
-    "a scale of one": (collision('<mesh filename="a.obj" scale="0.001"/>'), "three numbers"),
-    "a scale of 0": (collision('<mesh filename="a.obj" scale="1 0 1"/>'), "numbers other than 0"),
-    "a scale of NaN": (collision('<mesh filename="a.obj" scale="1 nan 1"/>'), "finite numbers"),
-    "a body in a visual": (f"<visual>{BOX}</visual>", "each <collision> in a <link>"),
-    "a body in a body": (BOX.replace("<geo", "<collision/><geo"), "each <collision> in a <link>"),
-}
-
-
-@pytest.mark.parametrize(("body", "must"), REFUSED.values(), ids=REFUSED.keys())
+@pytest.mark.parametrize(("body", "must"), SAMPLES["bodies"].values(), ids=SAMPLES["bodies"])
 def test_a_body_that_cannot_be_is_refused_by_its_link(
     tmp_path: Path, body: str, must: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SettingError) as refusal:
-        urdf_of(tmp_path, arm(body))
+        urdf_of(tmp_path, written({"body": body}))
     text = str(refusal.value)
     assert must in text and "link 'b'" in text and str(tmp_path / "r.urdf") in text
     assert "\n" not in text and not capfd.readouterr().err
 
 
-TAKEN = {
-    "a default namespace": arm(head=' xmlns="http://drake.mit.edu"'),
-    "an unbound prefix": arm(more='<gazebo><controller:x name="y"/></gazebo>'),
-    "Gazebo": arm(more='<gazebo reference="b"><collision>b</collision></gazebo><transmission/>'),
-    "a version": arm(head=' version="2.7" xmlns:xacro="http://www.ros.org/wiki/xacro"'),
-    "a byte order mark": "\ufeff" + arm(),
-    "spaces and line ends": collision('<box size=" 0.1\n 0.2\t0.3 "/>'),
-    "exponents": collision('<box size="1e-1 +.2 3.E-1"/>'),
-    "an empty origin": collision('<box size="0.1 0.2 0.3"/>', "<origin/>"),
-    "an inertia without mass": f"<inertial><origin/></inertial>{BOX}",
-    "an inertia of NaN": f'<inertial><mass value="nan"/><inertia ixx="nan"/></inertial>{BOX}',
-    "a visual that cannot be": f'<visual><origin xyz="1"/><geometry/></visual>{BOX}',
-    "an unknown material": f'<visual><material name="none"/></visual>{BOX}',
-    "a box with a file": collision('<box size="0.1 0.2 0.3" filename="none.obj"/>'),
-    "elements of others": f"<sensor/>{BOX.replace('<geo', '<drake:proximity_properties/><geo')}",
-}
-
-
-@pytest.mark.parametrize("body", TAKEN.values(), ids=TAKEN.keys())
+@pytest.mark.parametrize("parts", SAMPLES["taken"].values(), ids=SAMPLES["taken"])
 def test_a_body_is_built_whatever_stands_beside_it(
-    tmp_path: Path, body: str, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, parts: dict[str, str], capfd: pytest.CaptureFixture[str]
 ) -> None:
-    found = bodies(tmp_path, body if "<robot" in body else arm(body))
+    found = bodies(tmp_path, written(parts))
     assert list(found) == ["a", "b"]
     assert np.array_equal(2.0 * found["b"].geometry.halfSide, [0.1, 0.2, 0.3])
     assert not capfd.readouterr().err
@@ -124,46 +84,14 @@ def join(name: str, parent: str, child: str, kind: str = "fixed") -> str:
     return f'<joint name="{name}" type="{kind}">{ends}</joint>'
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (arm(more='<link name="b"/>'), "links have different names, was \"two links 'b'\""),
-        (arm(more=LINK + join("j", "b", "c")), "was \"two joints 'j'\""),
-        (arm(more=LINK), "one tree of links, was '2 roots: a, c'"),
-        (arm(more=join("k", "b", "a")), "links form a tree, was 'a loop: a → b → a'"),
-        (arm(more=LINK + join("k", "c", "c")), "was 'a loop: c → c'"),
-        (arm(more=LINK + join("k", "a", "c") + join("l", "b", "c")), "'c' on joints 'k' and 'l'"),
-        (arm(more=join("k", "b", "bb")), "the links of joint 'k', was \"without 'bb'\"; did you"),
-        (arm(more='<joint name="k" type="fixed"/>'), "have a <parent>, was \"joint 'k' without"),
-        (arm(more="<link/>"), "name in a <link>"),
-        (arm().replace('"b"', '""'), "name in a <link>"),
-        (arm(f"{BOX}<collision_checking><capsule/></collision_checking>"), "name in a <capsule>"),
-        (arm(limit='<limit lower="-1" upper="1" velocity="-2"/>'), "a number of at least 0 as vel"),
-        (arm(more=collision("<sphere/>")), "each <collision> in a <link>, was 'one in a <robot>'"),
-        (arm(body=LINK), "each <link> in a <robot>, was \"link 'b': one in a <link>"),
-        (arm(joint='<origin xyz="0 1"/>'), "three numbers as xyz of <origin>, was \"joint 'j'"),
-        (arm(joint='<mimic multiplier="2"/>'), "joint in a <mimic>"),
-        (arm(more='<xacro:property name="l"/>'), "FILE > robot.urdf), was '<xacro:property>'"),
-        (arm(collision('<sphere radius="${r}"/>')), "(xacro FILE > robot.urdf), was '<sphere rad"),
-        (arm(collision('<mesh filename="$(find x)/a.obj"/>')), "(xacro FILE > robot.urdf)"),
-        ("<!doctype html><html></html>", "was \"an HTML page in the file's place"),
-        ("version https://git-lfs.github.com/spec/v1\n", "was \"a Git-LFS pointer in the file's"),
-        ("", "was 'an empty file'"),
-        (arm()[:60], "must be XML with the root <robot>, was 'unclosed token: line 1"),
-        ("<sdf></sdf>", "must be XML with the root <robot>, was '<sdf>'"),
-        (arm(limit='<limit lower="1" upper="-1"/>'), "was \"joint 'j': 1 to -1\""),
-        (arm(limit='<limit upper="-1"/>'), "was \"joint 'j': 0 to -1 (an absent limit is 0)\""),
-        (arm(limit='<limit lower="nan" upper="1"/>'), "finite numbers"),
-        (arm(limit='<limit lower="-1 0" upper="1"/>'), "one number"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("parts", SAMPLES["files"], ids=lambda parts: parts["said"])
 def test_what_is_wrong_with_a_file_is_told_with_its_name(
-    tmp_path: Path, text: str, message: str
+    tmp_path: Path, parts: dict[str, str]
 ) -> None:
     with pytest.raises(SettingError) as refusal:
-        urdf_of(tmp_path, text)
+        urdf_of(tmp_path, written(parts))
     told = str(refusal.value)
-    assert message in told and str(tmp_path / "r.urdf") in told and "\n" not in told
+    assert parts["said"] in told and str(tmp_path / "r.urdf") in told and "\n" not in told
 
 
 @pytest.mark.parametrize(

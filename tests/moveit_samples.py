@@ -10,6 +10,7 @@ import yaml
 
 from evoexp.condition import Condition
 from evoexp.planners.moveit_tasks import arm_motion
+from evoexp.robots.mesh_pieces import loaded_mesh
 from evoexp.scenarios.moveit_files import REQUEST, SCENE, MessagePart, read_document
 from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world
 from evoexp.testing import conditions
@@ -113,7 +114,7 @@ def read(plain: Any) -> World:
     file = document(plain)
     read_state(file["robot_state"])
     read_allowed(file)
-    return read_world(file, None)
+    return read_world(file, None, (), loaded_mesh)
 
 
 def problem(folder: Path, message: Any, asked: Any = None, *words: str) -> Condition:

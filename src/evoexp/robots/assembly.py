@@ -126,11 +126,6 @@ class Robot(Component):
         """Return the arms, in the order of their slices of q."""
         raise NotImplementedError
 
-    @classmethod
-    def wants_pairs(cls, settings: dict[str, Any]) -> bool:
-        """Whether plain settings are to be given derived pairs of bodies, as data."""
-        return False
-
     def notes(self) -> list[str]:
         """Remark on what the description leaves open."""
         return []

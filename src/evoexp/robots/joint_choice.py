@@ -5,13 +5,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from evoexp.errors import SettingError, nearest
 from evoexp.robots.mesh_checks import unit_of
-from evoexp.robots.urdf_model import BASE, coordinate_names
+from evoexp.robots.urdf_model import BASE, LIMIT_SETTINGS, coordinate_names
 from evoexp.robots.urdf_reading import PATH, Mimic, UrdfJoint
 
 if TYPE_CHECKING:
     from evoexp.robots.urdf import Urdf
-
-LIMIT_SETTINGS = {"revolute": ("turn_limit", "deg"), "prismatic": ("slide_limit", "m")}
 
 
 class JointRoles(NamedTuple):
@@ -167,5 +165,6 @@ def urdf_notes(robot: "Urdf") -> Iterator[str]:
 def _limited_joints(robot: "Urdf", roles: JointRoles) -> Iterator[tuple[UrdfJoint, str, str]]:
     """Yield the joints between limits that move of their own, with the setting without them."""
     for joint in robot.file.joints.values():
-        if joint.kind in LIMIT_SETTINGS and joint.name in roles.moving:
-            yield joint, *LIMIT_SETTINGS[joint.kind]
+        if joint.kind in ("revolute", "prismatic") and joint.name in roles.moving:
+            setting, _, unit = LIMIT_SETTINGS[joint.kind]
+            yield joint, setting, unit

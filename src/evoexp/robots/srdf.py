@@ -11,7 +11,7 @@ class Srdf:
 
     def __init__(self, content: bytes, joints: dict[str, UrdfJoint]) -> None:
         """Read the text, of the robot that has some joints, by their names."""
-        self._root = root = parsed_xml(content, "robot.srdf", "robot")
+        self._root = root = parsed_xml(content, "robot.srdf")
         self._joints = joints
         self._above = {joint.child: joint for joint in joints.values()}
         self._groups = {str(group.get("name")): group for group in root.iterfind("group")}

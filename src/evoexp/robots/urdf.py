@@ -121,18 +121,13 @@ class Urdf(Chain):
         return urdf_file(self.urdf.content)
 
     @property
-    def robot_name(self) -> str:
-        """The robot's name in the URDF."""
-        return self.file.name
-
-    @property
     def semantics(self) -> Srdf | None:
         """The SRDF; None: there is none."""
         return None if self.srdf is None else Srdf(self.srdf.content, self.file.joints)
 
     @classmethod
     def wants_pairs(cls, settings: dict[str, Any]) -> bool:
-        """Whether pairs are still to be derived."""
+        """Whether plain settings are still to be given derived pairs of bodies, as data."""
         return settings.get("pairs") is None and "urdf" in settings
 
     def build(self) -> Assembly:
@@ -187,14 +182,13 @@ class Urdf(Chain):
         settings["urdf"] = {SHA256: keep(content)}
         if meshes:
             settings["meshes"] = list(meshes.values())
-        for name, path in (("spheres", settings.pop("spheres", None)), ("srdf", srdf)):
-            if path is None:
-                continue
-            content = file_content(path, f"{field}.{name}")
-            with _named(path):
-                if name == "spheres":
-                    read_urdf(content, f"{field}.spheres")
-                else:
-                    parsed_xml(content, f"{field}.srdf", "robot")
-            settings[name] = {SHA256: keep(content)}
+        for name, path, check in (
+            ("spheres", settings.pop("spheres", None), read_urdf),
+            ("srdf", srdf, parsed_xml),
+        ):
+            if path is not None:
+                content = file_content(path, f"{field}.{name}")
+                with _named(path):
+                    check(content, f"{field}.{name}")
+                settings[name] = {SHA256: keep(content)}
         return settings

@@ -29,6 +29,12 @@ FLOATING = {"x": X, "y": Y, "z": Z, "yaw": Z, "pitch": Y, "roll": X}
 COORDINATES = {"planar": PLANAR, "floating": FLOATING}
 ALIGNED = 1e-12  # [-] axes as near as that to x, y or z are these
 UNLIMITED = 1e6  # [rad, m] limits as large as this are none
+# setting of the limits of joints without them, by kind; its unit [rad, m], and the unit's name
+LIMIT_SETTINGS = {
+    "continuous": ("continuous_turns", 360.0 * DEGREE, "turns"),
+    "revolute": ("turn_limit", DEGREE, "deg"),
+    "prismatic": ("slide_limit", 1.0, "m"),
+}
 BASE = "base"  # what the coordinates of a base that moves are called: base_x, base_y, …
 # Pinocchio's joints of one coordinate by kind: along or about x, y, z, and any other axis
 JOINT_MODELS = {
@@ -102,11 +108,8 @@ def _parts(joint: UrdfJoint, robot: "Urdf") -> list[UrdfJoint]:
 
 def _limited(joint: UrdfJoint, robot: "Urdf") -> UrdfJoint:
     """Give a joint limits to either side, if it has none or is continuous."""
-    setting, most = {
-        "continuous": ("continuous_turns", 360.0 * DEGREE * robot.continuous_turns),
-        "revolute": ("turn_limit", robot.turn_limit * DEGREE),
-        "prismatic": ("slide_limit", robot.slide_limit),
-    }[joint.kind]
+    setting, unit, _ = LIMIT_SETTINGS[joint.kind]
+    most = unit * float(getattr(robot, setting))
     low, high = (0.0 if limit is None else limit for limit in joint.limits)
     if joint.kind == "continuous" or joint.limits == (None, None):
         low, high = -most, most

@@ -88,9 +88,9 @@ class UrdfFile(NamedTuple):
 
 
 @functools.lru_cache(maxsize=32)
-def parsed_xml(content: bytes, field: str, tag: str) -> Any:
+def parsed_xml(content: bytes, field: str) -> Any:
     """Read XML as TinyXML does, without namespaces; return its root element, shared by all."""
-    must, builder, open_tags, count = f"XML with the root <{tag}>", ET.TreeBuilder(), [], 0
+    must, builder, open_tags, count = "XML with the root <robot>", ET.TreeBuilder(), [], 0
 
     def start(name: str, attributes: Any) -> None:
         nonlocal count
@@ -114,7 +114,7 @@ def parsed_xml(content: bytes, field: str, tag: str) -> Any:
         root = builder.close()
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise SettingError(field, must, str(error)) from None
-    if root.tag != tag:
+    if root.tag != "robot":
         raise SettingError(field, must, f"<{root.tag}>")
     return root
 
@@ -130,7 +130,7 @@ def urdf_file(content: bytes, field: str = PATH) -> UrdfFile:
 
 def read_urdf(content: bytes, field: str) -> UrdfFile:
     """Read the links, collision bodies and joints of a URDF."""
-    root = parsed_xml(content, field, "robot")
+    root = parsed_xml(content, field)
     for element in root.iter():
         if element.tag.startswith("xacro:"):
             raise SettingError(field, XACRO, f"<{element.tag}>")

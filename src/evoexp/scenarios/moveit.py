@@ -141,7 +141,7 @@ class MoveitTask(Component):
 
     def notes(self, robot: Any) -> tuple[str, ...]:
         """Name the parts of the messages that are left out and may matter to a robot."""
-        name = getattr(robot, "robot_name", "")
+        name = robot.file.name if hasattr(robot, "file") else ""
         scene, request = (self._message(name).value for name in FILES)
         notes = []
         if scene.get("is_diff"):

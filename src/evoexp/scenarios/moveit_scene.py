@@ -167,15 +167,11 @@ class World(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def read_world(
-    scene: MessagePart,
-    links: "LinkFrames | None",
-    meshes: tuple[SceneMesh, ...] = (),
-    load: LoadMesh | None = None,
+    scene: MessagePart, links: "LinkFrames | None", meshes: tuple[SceneMesh, ...], load: LoadMesh
 ) -> World:
     """Read the objects of a planning scene, among a robot's links if these have names."""
     loaded = {}
     for mesh in meshes:
-        assert load is not None
         field = f"{scene.field}: the mesh '{mesh.name}'"
         loaded[mesh.name] = load(mesh.file.content, Path(mesh.name).suffix, field)
     for name, size, neutral in (("link_padding", "padding", 0.0), ("link_scale", "scale", 1.0)):

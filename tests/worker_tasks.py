@@ -4,7 +4,6 @@ import hashlib
 import os
 import random
 import signal
-import sys
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -79,7 +78,3 @@ def fork_and_die(seconds: float) -> None:
         time.sleep(seconds)
         os._exit(0)
     os.kill(os.getpid(), signal.SIGKILL)
-
-
-def loaded_packages() -> set[str]:
-    return {name.partition(".")[0] for name in sys.modules}

@@ -58,14 +58,6 @@ def test_bodies_and_tool_of_a_planar_chain_by_hand() -> None:
         )
 
 
-def test_arms_are_slices_of_one_configuration() -> None:
-    assembly = Arms(arms=(planar(1.0, 1.0, 1.0), planar(2.0, base_position=(5.0, 0.0)))).build()
-    assert assembly.arm_slices.tolist() == [[0, 3], [3, 4]]
-    assert assembly.model.nq == 4
-    assert [link.arm for link in assembly.links] == [0, 0, 0, 1]
-    assert assembly.table.planar
-
-
 def test_joint_limits_reach_the_model() -> None:
     limits = ((-1.0, 1.0), (0.0, 2.0), (-0.5, 0.25))
     model = ARM.model_copy(update={"joint_limits": limits}).build().model

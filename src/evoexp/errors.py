@@ -61,6 +61,18 @@ class SettingError(EvoexpError):
         self.field, self.must, self.was, self.hint = field, must, was, hint
 
 
+def demand(holds: object, field: str, must: str, was: object, hint: str = "") -> None:
+    """Refuse a setting by a `SettingError`, unless a condition holds."""
+    if not holds:
+        raise SettingError(field, must, was, hint)
+
+
+def demand_known(name: str, known: Iterable[str], field: str, must: str) -> None:
+    """Refuse a name that is not known by a `SettingError` that tells the nearest."""
+    if name not in known:
+        raise SettingError(field, must, name, nearest(name, known))
+
+
 class UnknownSetting(EvoexpError):
     """A key that no component has; names the nearest, and lists them where they are few."""
 

@@ -11,7 +11,7 @@ from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollisi
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.collision.box_support import coal
 from evoexp.collision.scene import Part, Scene, obstacle_pairs, scene
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
@@ -118,10 +118,9 @@ def arm_problem(
     elif isinstance(scenario, GridMotion):
         # a platform whose joints slide from the first node of the grid to the last one
         slides = assembly.table.slides
-        if len(slides) != len(scenario.size) or not slides.all():
-            must = f"one that slides along the {len(scenario.size)} directions of the grid"
-            named = [str(name) for name in list(assembly.model.names)[1:]]
-            raise SettingError("robot", must, f"one of joints {', '.join(named)}")
+        must = f"one that slides along the {len(scenario.size)} directions of the grid"
+        named = f"one of joints {', '.join(list(assembly.model.names)[1:])}"
+        demand(len(slides) == len(scenario.size) and slides.all(), "robot", must, named)
         floor = assembly.model.copy()
         floor.lowerPositionLimit = np.zeros(len(slides))
         floor.upperPositionLimit = np.array(scenario.size, dtype=np.float64) - 1.0
@@ -159,9 +158,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         return arm_motion(assembly, task)
     from evoexp.collision.planar.link_collision import two_link_arms  # and its kernels
 
-    if task.stationary:
-        must = "empty: this planner moves all robots"
-        raise SettingError("scenario.stationary", must, list(task.stationary))
+    must = "empty: this planner moves all robots"
+    demand(not task.stationary, "scenario.stationary", must, list(task.stationary))
     arms = two_link_arms(assembly)
     ends = task.ends(np.array([arm.base for arm in arms]), np.array([arm.lengths for arm in arms]))
     q_start, q_goal = ([(one, two - one) for one, two in end.tolist()] for end in ends)
@@ -230,8 +228,7 @@ def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
             if distance >= 0.0:  # the surfaces of meshes, of which coal tells no depth
                 how = f"overlap by at most {_hull_depth(bodies, placements, a, b):.3g} {unit}"
             worst, found = distance, f"{one} and {two} {how}"
-    if found:
-        raise SettingError(field, "free of contact between bodies", found)
+    demand(not found, field, "free of contact between bodies", found)
 
 
 def _hull_depth(bodies: Scene, placements: Any, one: int, two: int) -> float:

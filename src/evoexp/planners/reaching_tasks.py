@@ -6,7 +6,7 @@ import numpy as np
 
 from evoexp.collision.planar.link_ellipses import EllipseCollision, LinkEllipses
 from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
@@ -34,14 +34,13 @@ def reaching_problem(robot: Robot, scenario: PickAndPlace, model: LinkEllipses) 
     collision = model.bind(assembly, table)
     arm, start = assembly.model, np.array(scenario.q_start)
     limits = np.column_stack([arm.lowerPositionLimit, arm.upperPositionLimit])
-    if not (np.abs(limits) < 1e6).all():
-        raise SettingError("robot.joint_limits", "given: postures are drawn between them", None)
-    if len(start) != arm.nq:
-        raise SettingError("scenario.q_start", f"one angle per joint ({arm.nq})", len(start))
+    is_limited = (np.abs(limits) < 1e6).all()
+    demand(is_limited, "robot.joint_limits", "given: postures are drawn between them", None)
+    count = f"one angle per joint ({arm.nq})"
+    demand(len(start) == arm.nq, "scenario.q_start", count, len(start))
     for k, (angle, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
-        if not least <= angle <= greatest:
-            must = f"within the joint's limits, {least:g} to {greatest:g} rad"
-            raise SettingError(f"scenario.q_start[{k}]", must, float(angle))
+        must = f"within the joint's limits, {least:g} to {greatest:g} rad"
+        demand(least <= angle <= greatest, f"scenario.q_start[{k}]", must, float(angle))
     if contact := collision.contact(start, start):
         must = f"free of collision (link {contact.link} touches obstacle {contact.obstacle})"
         raise SettingError("scenario.q_start", must, list(scenario.q_start))

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from evoexp.attachments import File
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.robots.assembly import AppendArm, Assembly, Chain, Robot
 from evoexp.validation import TARGET
 
@@ -31,9 +31,8 @@ class Arms(Robot):
     def build(self) -> Assembly:
         """Return the robot with its derived pairs."""
         for k, arm in enumerate(self.arms):
-            if getattr(arm, "spheres", None) is not None:
-                must = "left out for one of several arms"
-                raise SettingError(f"robot.arms[{k}].spheres", must, "a file")
+            must = "left out for one of several arms"
+            demand(not getattr(arm, "spheres", None), f"robot.arms[{k}].spheres", must, "a file")
         return super().build()._replace(pairs=self.pairs.content if self.pairs else None)
 
     @classmethod

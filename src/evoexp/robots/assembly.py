@@ -7,7 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import demand, demand_known
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
 from evoexp.robots.bodies import along
@@ -58,13 +58,12 @@ class ArmStates(NamedTuple):
 
     def values_of(self, name: str, field: str) -> list[float]:
         """Return the configuration of a state [deg, m]."""
-        if name not in self.states:
-            names = sorted(self.states)
-            must = f"a state that the robot's SRDF names ({', '.join(names) or 'none'}), or numbers"
-            raise SettingError(field, must, name, nearest(name, names))
+        names = sorted(self.states)
+        must = f"a state that the robot's SRDF names ({', '.join(names) or 'none'}), or numbers"
+        demand_known(name, names, field, must)
         state = self.states[name]
-        if missing := [joint for joint in self.joints if joint not in state]:
-            raise SettingError(field, f"a state that tells {', '.join(missing)}", name)
+        missing = [joint for joint in self.joints if joint not in state]
+        demand(not missing, field, f"a state that tells {', '.join(missing)}", name)
         return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
 
 

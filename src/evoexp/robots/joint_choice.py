@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.robots.mesh_checks import unit_of
 from evoexp.robots.urdf_model import BASE, LIMIT_SETTINGS, coordinate_names
 from evoexp.robots.urdf_reading import PATH, Mimic, UrdfJoint
@@ -42,9 +42,8 @@ def joint_roles(robot: "Urdf") -> JointRoles:
     if robot.group and not groups:
         groups = {"robot.group": robot.group}
     if robot.joints:
-        if groups:
-            must = f"left out beside {'robot.groups' if robot.groups else 'robot.group'}"
-            raise SettingError("robot.joints", must, list(robot.joints))
+        must = f"left out beside {'robot.groups' if robot.groups else 'robot.group'}"
+        demand(not groups, "robot.joints", must, list(robot.joints))
         arms = [{part for name in robot.joints for part in free[_free(name, joints, free)]}]
     elif groups:
         if srdf is None:
@@ -52,20 +51,17 @@ def joint_roles(robot: "Urdf") -> JointRoles:
         arms = []
         for field, group in groups.items():
             members = srdf.group_joints(group, field) & free.keys()
-            if not members:
-                raise SettingError(field, "a group with a joint that moves", group)
+            demand(members, field, "a group with a joint that moves", group)
             arms.append({part for name in members for part in free[name]})
     else:
         arms = [{part for parts in free.values() for part in parts}]
     if base in ("planar", "floating"):
         arms[0] |= set(coordinate_names(BASE, base))
-    if not all(arms):
-        raise SettingError(PATH, "a URDF with a joint that moves", None)
+    demand(all(arms), PATH, "a URDF with a joint that moves", None)
     for k, arm in enumerate(arms):
         for other in arms[:k]:
-            if shared := sorted(arm & other):
-                must = "groups that have no joint in common"
-                raise SettingError("robot.groups", must, ", ".join(shared))
+            must = "groups that have no joint in common"
+            demand(not arm & other, "robot.groups", must, ", ".join(sorted(arm & other)))
     tips = [srdf.tip(group) for group in groups.values()] if srdf is not None and groups else [""]
     rules = {
         name: _whole_rule(joint.mimic, joints) for name, joint in joints.items() if joint.mimic
@@ -128,8 +124,7 @@ def standing_values(robot: "Urdf", roles: JointRoles) -> dict[str, float]:
             must = f"left out: this joint follows '{roles.rules[name].source}'"
         elif joints[name].kind in ("fixed", "planar", "floating"):
             must = f"left out: a {joints[name].kind} joint has no value"
-        if must:
-            raise SettingError(f"robot.fixed.{name}", must, value)
+        demand(not must, f"robot.fixed.{name}", must, value)
     return dict(robot.fixed)
 
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import coal
 import numpy as np
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.ordered_sums import matrix_product
@@ -111,8 +111,7 @@ def _written(pieces: list[FloatArray], field: str) -> bytes:
         lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (triangles + (1 + before)).tolist()]
         before, number = before + len(corners), number + 1
-    if not lines:
-        raise SettingError(field, "left out for meshes without an inside", "coacd or hulls")
+    demand(lines, field, "left out for meshes without an inside", "coacd or hulls")
     return ("\n".join(lines) + "\n").encode()
 
 

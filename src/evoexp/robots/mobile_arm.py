@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import model_validator
 
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import ArmParts, Chain, Link, link_capsule
 from evoexp.validation import Limits, NonNegative, Positive
@@ -38,9 +38,8 @@ class MobileArm(Chain):
     @model_validator(mode="after")
     def _is_longer_than_high(self) -> Self:
         length, height = self.platform_size
-        if length <= height:
-            must = "[length, height] with length > height"
-            raise SettingError("platform_size", must, [length, height])
+        must = "[length, height] with length > height"
+        demand(length > height, "platform_size", must, [length, height])
         return self
 
     @property

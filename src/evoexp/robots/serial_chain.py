@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.robots.assembly import ArmParts, Chain, Link
@@ -27,8 +27,7 @@ class SerialJoint(Settings):
 
     @model_validator(mode="after")
     def _points_somewhere(self) -> Self:
-        if not any(self.axis):
-            raise SettingError("axis", "a direction, not (0, 0, 0)", list(self.axis))
+        demand(any(self.axis), "axis", "a direction, not (0, 0, 0)", list(self.axis))
         return self
 
     def model(self) -> Any:

@@ -1,6 +1,6 @@
 """An SRDF: groups of joints, named states, end effectors, pairs that are never judged."""
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, demand_known, nearest
 from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint, parsed_xml
 
 MOST_GROUPS = 300  # nested in one another
@@ -58,12 +58,10 @@ class Srdf:
 
     def group_joints(self, group: str, field: str, above: tuple[str, ...] = ()) -> set[str]:
         """Find the joints of a group that lies in those above: of its chains, links and groups."""
-        if group not in self._groups:
-            names = list(self._groups)
-            must = f"a group of the SRDF ({', '.join(names) or 'it has none'})"
-            raise SettingError(field, must, group, nearest(group, names))
-        if group in above or len(above) > MOST_GROUPS:
-            raise SettingError(field, "a group that does not contain itself", group)
+        must = f"a group of the SRDF ({', '.join(self._groups) or 'it has none'})"
+        demand_known(group, self._groups, field, must)
+        is_outside = group not in above and len(above) <= MOST_GROUPS
+        demand(is_outside, field, "a group that does not contain itself", group)
         if group in self._joints_of:
             return self._joints_of[group]
         joints: set[str] = set()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool
@@ -41,9 +41,8 @@ class UrdfTree:
         self.base = placed(robot.base_position, robot.base_rotation)
         if robot.base_frame:
             frame = self._frame(robot.base_frame, "robot.base_frame")
-            if frame.parentJoint != 0:
-                must = "a frame that does not move"
-                raise SettingError("robot.base_frame", must, robot.base_frame)
+            must = "a frame that does not move"
+            demand(frame.parentJoint == 0, "robot.base_frame", must, robot.base_frame)
             self.base = self.base * frame.placement.inverse()
         self._srdf = robot.semantics
         index = {str(name): k for k, name in enumerate(self.model.names)}
@@ -64,9 +63,7 @@ class UrdfTree:
     def _frame(self, name: str, field: str) -> Any:
         """Find a `pin.Frame` by its name."""
         names = [frame.name for frame in self.model.frames]
-        if name not in names:
-            must = f"a frame of the URDF ({', '.join(names)})"
-            raise SettingError(field, must, name, nearest(name, names))
+        demand_known(name, names, field, f"a frame of the URDF ({', '.join(names)})")
         return self.model.frames[names.index(name)]
 
     def _ordered(self, arms: list[set[int]]) -> list[list[int]]:
@@ -192,8 +189,7 @@ class UrdfTree:
         A link is the line from a joint to one behind it, the last to the tool.
         """
         own = self.model
-        if not self.bodies:
-            raise SettingError(PATH, "a URDF with collision bodies", None)
+        demand(self.bodies, PATH, "a URDF with collision bodies", None)
         # the place of the tree's first joint in the robot
         first = model.njoints - sum(len(joints) for joints in self.order[:index])
         carriers, links = self._carriers(first), []
@@ -246,8 +242,7 @@ class UrdfTree:
             ]
             frame = max(frames, key=self._depth)
         carrier, place = carriers[frame.parentJoint]
-        if carrier == 0:
-            raise SettingError(field, "a frame that moves", name)
+        demand(carrier, field, "a frame that moves", name)
         place = place * frame.placement
         return Tool(carrier, np.array(place.rotation), np.array(place.translation))
 

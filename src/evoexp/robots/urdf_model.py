@@ -11,7 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
@@ -165,9 +165,8 @@ def _shapes(robot: "Urdf", body: UrdfBody) -> list[Any]:
         shapes = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
         return [shapes.get(body.kind, coal.Capsule)(*body.sizes)]
     names = [mesh.name for mesh in robot.meshes]
-    if body.mesh not in names:
-        must = "those that the URDF names"
-        raise SettingError("robot.meshes", must, f"without '{body.mesh}'")
+    must = "those that the URDF names"
+    demand(body.mesh in names, "robot.meshes", must, f"without '{body.mesh}'")
     k, is_hull = names.index(body.mesh), body.kind == "convex"
     content, pieces = robot.meshes[k].file.content, robot.meshes[k].pieces
     if robot.decomposition is None:
@@ -186,13 +185,11 @@ def given_spheres(robot: "Urdf", model: Any, bodies: list[Any]) -> list[FloatArr
     field, links = "robot.spheres", robot.file.links
     given = read_urdf(robot.spheres.content, field).links
     for link, shapes in given.items():
-        if shapes and link not in links:
-            must = "a URDF whose spheres belong to links of the robot"
-            raise SettingError(field, must, link, nearest(link, list(links)))
-        if any(shape.kind != "sphere" for shape in shapes):
-            raise SettingError(field, "a URDF of spheres", f"another body of '{link}'")
-    if not any(given.values()):
-        raise SettingError(field, "a URDF of spheres", "one without")
+        if shapes:
+            demand_known(link, links, field, "a URDF whose spheres belong to links of the robot")
+        is_sphere = all(shape.kind == "sphere" for shape in shapes)
+        demand(is_sphere, field, "a URDF of spheres", f"another body of '{link}'")
+    demand(any(given.values()), field, "a URDF of spheres", "one without")
     rows: list[list[list[float]]] = [[] for _ in bodies]
     for sphere in placed_bodies(robot, model, given, field):
         point = sphere.placement.translation

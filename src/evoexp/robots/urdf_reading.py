@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 import yaml
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.input_files import stand_in
 
 PATH = "robot.path"  # the setting that names the URDF, for errors
@@ -192,14 +192,12 @@ def _body(link: Any, collision: Any) -> UrdfBody:
 def _joint(joint: Any, field: str) -> UrdfJoint:
     """Read a joint; check its kind, ends, axis and limits."""
     kind, name = joint.get("type"), joint.get("name")
-    if kind not in KINDS:
-        must = f"a URDF whose joints are {', '.join(KINDS[:-1])} or {KINDS[-1]}"
-        raise SettingError(field, must, f"joint '{name}' of type {kind}")
+    must = f"a URDF whose joints are {', '.join(KINDS[:-1])} or {KINDS[-1]}"
+    demand(kind in KINDS, field, must, f"joint '{name}' of type {kind}")
     ends = [joint.find(end) for end in ("parent", "child")]
     for end, element in zip(("parent", "child"), ends, strict=True):
-        if element is None:
-            must = f"a URDF whose joints have a <{end}>"
-            raise SettingError(field, must, f"joint '{name}' without")
+        must = f"a URDF whose joints have a <{end}>"
+        demand(element is not None, field, must, f"joint '{name}' without")
     parent, child = (element.get("link") for element in ends)
     if kind == "fixed":
         return UrdfJoint(name, kind, parent, child, _placement(joint))
@@ -264,9 +262,8 @@ def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
                 must = "a URDF whose joints follow joints that are there"
                 raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
             joint = joints[joint.mimic.source]
-            if joint.name in passed:
-                must = "a URDF whose joints do not follow themselves"
-                raise SettingError(field, must, " → ".join([*passed, joint.name]))
+            must = "a URDF whose joints do not follow themselves"
+            demand(joint.name not in passed, field, must, " → ".join([*passed, joint.name]))
             passed.append(joint.name)
 
 

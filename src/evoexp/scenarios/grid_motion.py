@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from evoexp.attachments import File
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.scenarios.obstacles import BoxObstacle
 from evoexp.validation import Component, Count, NonNegative, Positive
 
@@ -46,10 +46,9 @@ class GridMotion(Component):
         inside = " × ".join(f"0..{count - 1}" for count in self.size)
         for name in ("start", "goal"):
             node = getattr(self, name)
-            if len(node) != len(self.size) or not self._are_nodes(node, node):
-                raise SettingError(name, f"a node inside the grid ({inside})", list(node))
-        if self.start == self.goal:
-            raise SettingError("goal", "another node than start", list(self.goal))
+            is_inside = len(node) == len(self.size) and self._are_nodes(node, node)
+            demand(is_inside, name, f"a node inside the grid ({inside})", list(node))
+        demand(self.start != self.goal, "goal", "another node than start", list(self.goal))
         half = len(self.size)
         for k, corners in enumerate(self.obstacles):
             must = f"from a lower to an upper corner inside the grid ({inside})"
@@ -73,9 +72,8 @@ class GridMotion(Component):
             nodes[_block(corners[:half], corners[half:])] = True
         for name in ("start", "goal"):
             node = getattr(self, name)
-            if nodes[node]:
-                must = "a free node; an obstacle is there"
-                raise SettingError(f"scenario.{name}", must, list(node))
+            must = "a free node; an obstacle is there"
+            demand(not nodes[node], f"scenario.{name}", must, list(node))
         return nodes
 
     def bodies(self) -> tuple[BoxObstacle, ...]:

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.elementary import DEGREE, acos, atan2
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import SceneTask
@@ -47,9 +47,8 @@ class Posture(Settings):
             side = 1.0 if self.elbow == "left" else -1.0
             angles = _reach(f"{field}.tip", np.array(self.tip) - base, lengths, side)
         for k, angle in enumerate(angles):
-            if not 0.0 <= angle <= HALF_TURN:
-                must = "within [0, 180] deg, where the genes live"
-                raise SettingError(f"{field}.angles[{k}]", must, float(angle))
+            must = "within [0, 180] deg, where the genes live"
+            demand(0.0 <= angle <= HALF_TURN, f"{field}.angles[{k}]", must, float(angle))
         return angles
 
 
@@ -71,9 +70,8 @@ class LinkMotion(SceneTask):
         """
         ends = []
         for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
-            if len(postures) != len(bases):
-                must = f"one posture per robot ({len(bases)})"
-                raise SettingError(f"scenario.{name}", must, len(postures))
+            must = f"one posture per robot ({len(bases)})"
+            demand(len(postures) == len(bases), f"scenario.{name}", must, len(postures))
             fields = [f"scenario.{name}[{robot}]" for robot in range(len(bases))]
             ends.append(np.array([*map(Posture.link_angles, postures, fields, bases, lengths)]))
         start, goal = ends
@@ -99,10 +97,8 @@ def _reach(field: str, tip: FloatArray, lengths: FloatArray, side: float) -> Flo
     rounding = ROUNDING * (squared + first * first + second * second) / (first * second)
     if abs(abs(cosine) - 1.0) <= rounding:
         cosine = 1.0 if cosine > 0.0 else -1.0
-    if not -1.0 <= cosine <= 1.0:
-        least, most = abs(first - second), first + second
-        must = f"{least:g} to {most:g} away from the robot's base"
-        raise SettingError(field, must, f"{float(np.sqrt(squared)):g} away")
+    must = f"{abs(first - second):g} to {first + second:g} away from the robot's base"
+    demand(-1.0 <= cosine <= 1.0, field, must, f"{float(np.sqrt(squared)):g} away")
     # of the second link against the first: an elbow on the left bends to the right
     bend = -side * acos(cosine)
     sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))

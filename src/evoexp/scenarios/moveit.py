@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from evoexp.attachments import SHA256, File, file_content, keep, located
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, demand_known
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
@@ -169,9 +169,8 @@ class MoveitTask(Component):
         """Return the goal of the joints that move, (nq,) [rad, m]; None: it is a pose."""
         goal = self.plan_request.joint_goal
         for name in goal:
-            if name not in joints:
-                must = f"a goal for joints that move ({', '.join(joints)})"
-                raise SettingError("scenario.request", must, name, nearest(name, joints))
+            must = f"a goal for joints that move ({', '.join(joints)})"
+            demand_known(name, joints, "scenario.request", must)
         return _positions(joints, goal, self.state) if goal else None
 
     def link_goal(self, frames: Frames) -> LinkGoal:
@@ -182,11 +181,10 @@ class MoveitTask(Component):
 def _positions(names: tuple[str, ...], *states: dict[str, float]) -> FloatArray:
     """Return the positions of joints, (joints,), from the first state that names each."""
     positions = {name: q for state in reversed(states) for name, q in state.items()}
+    known = ", ".join(dict.fromkeys(joint for state in states for joint in state)) or "none"
     for name in names:
-        if name not in positions:
-            known = ", ".join(dict.fromkeys(joint for state in states for joint in state))
-            must = f"a start or goal for joint '{name}'"
-            raise SettingError("scenario.request", must, f"joints {known or 'none'}")
+        must = f"a start or goal for joint '{name}'"
+        demand(name in positions, "scenario.request", must, f"joints {known}")
     return np.array([positions[name] for name in names], dtype=np.float64)
 
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.input_files import MEGABYTE
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.ordered_sums import matrix_product
@@ -226,9 +226,8 @@ class _Loader(yaml.CSafeLoader):  # type: ignore[misc]  # PyYAML's C part has no
 @functools.lru_cache(maxsize=64)
 def read_document(content: bytes, field: str, message: str) -> MessagePart:
     """Read the only message of a file, of a type that `FIELDS` names."""
-    if len(content) > MAX_SCENE:
-        must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
-        raise SettingError(field, must, f"{len(content) / MEGABYTE:.1f} MB")
+    must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
+    demand(len(content) <= MAX_SCENE, field, must, f"{len(content) / MEGABYTE:.1f} MB")
     content = content.removeprefix(b"\xef\xbb\xbf")
     for form in FORMATS:
         if re.match(form["begins"].encode(), content, re.IGNORECASE):
@@ -239,10 +238,9 @@ def read_document(content: bytes, field: str, message: str) -> MessagePart:
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = str(error).strip().replace("\n", " ")[:120]
         raise SettingError(field, MUST, line) from None
-    if len(roots) > 1:
-        must = f"{MUST}, one message"
-        hint = "; leave the one that is meant in the file"
-        raise SettingError(field, must, f"a stream of {len(roots)} (---)", hint)
+    hint = "; leave the one that is meant in the file"
+    was = f"a stream of {len(roots)} (---)"
+    demand(len(roots) <= 1, field, f"{MUST}, one message", was, hint)
     root = roots[0] if roots else None
     if not isinstance(root, dict):
         raise SettingError(field, MUST, "nothing" if root is None else type(root).__name__)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.ordered_sums import length, matrix_product, rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative, Positive, Settings
@@ -155,9 +155,8 @@ def _row(obstacle: Any, field: str) -> tuple[int, FloatArray, FloatArray, Any]:
             return ELLIPSE, _point(obstacle.center), turn, (one, two, two)
         case HullObstacle():
             turn, (middle, half) = rotation_matrix(obstacle.rotation), obstacle.box
-            if not half.min() > 0.0:
-                must = "points that lie in no plane"
-                raise SettingError(f"{field}.points", must, list(2.0 * half))
+            must = "points that lie in no plane"
+            demand(half.min() > 0.0, f"{field}.points", must, list(2.0 * half))
             return BOX, _point(obstacle.center) + matrix_product(turn, middle), turn, half
         case HalfSpaceObstacle():
             axis = _point(obstacle.normal)

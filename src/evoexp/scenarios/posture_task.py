@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, demand_known
 from evoexp.scenarios.obstacles import Obstacle, SceneTask
 from evoexp.validation import NonNegative, Positive, Settings, Vector
 
@@ -111,24 +111,20 @@ class PostureTask(SceneTask):
     @model_validator(mode="after")
     def _holds_one_thing_at_a_time(self) -> Self:
         for k, name in enumerate(self.all_names):
-            if name in self.all_names[:k]:
-                must = "a name that no other obstacle has"
-                raise SettingError(f"obstacles[{k}].name", must, name)
+            must = "a name that no other obstacle has"
+            demand(name not in self.all_names[:k], f"obstacles[{k}].name", must, name)
         held = ""
         for k, phase in enumerate(self.phases):
             field, is_grasp = f"phases[{k}]", phase.then == "attach"
-            if is_grasp != bool(phase.object):
-                must = "given with then: attach, and only then"
-                raise SettingError(f"{field}.object", must, phase.object or None)
-            if is_grasp and held:
-                must = f"detach before anything else is taken ({held} is held)"
-                raise SettingError(f"{field}.then", must, "attach")
-            if phase.then == "detach" and not held:
-                raise SettingError(f"{field}.then", "attach in a phase before", "detach")
+            must = "given with then: attach, and only then"
+            demand(is_grasp == bool(phase.object), f"{field}.object", must, phase.object or None)
+            must = f"detach before anything else is taken ({held} is held)"
+            demand(not (is_grasp and held), f"{field}.then", must, "attach")
+            is_held = held or phase.then != "detach"
+            demand(is_held, f"{field}.then", "attach in a phase before", "detach")
             if isinstance(phase.goal, SurfaceGoal):
-                if phase.goal.object == held:
-                    must = "another object than the one held"
-                    raise SettingError(f"{field}.goal.object", must, held)
+                must = "another object than the one held"
+                demand(phase.goal.object != held, f"{field}.goal.object", must, held)
                 self.index_of(phase.goal.object, f"{field}.goal.object")
             if is_grasp:
                 shape = self.objects[self.index_of(phase.object, f"{field}.object")].shape
@@ -139,8 +135,7 @@ class PostureTask(SceneTask):
             if phase.contacts and self.allowed_penetration is None:
                 must = f"given: {field}.contacts allows contacts"
                 raise SettingError("allowed_penetration", must, None)
-        if not any(self.up):
-            raise SettingError("up", "a direction, not (0, 0, 0)", list(self.up))
+        demand(any(self.up), "up", "a direction, not (0, 0, 0)", list(self.up))
         return self
 
     @property
@@ -168,9 +163,8 @@ class PostureTask(SceneTask):
 
     def index_of(self, name: str, field: str) -> int:
         """Return the index of one of `objects`."""
-        if name not in self.names:
-            must = f"the name of an obstacle ({', '.join(self.names) or 'there is none'})"
-            raise SettingError(field, must, name, nearest(name, self.names))
+        must = f"the name of an obstacle ({', '.join(self.names) or 'there is none'})"
+        demand_known(name, self.names, field, must)
         return self.names.index(name)
 
     @property

@@ -9,7 +9,7 @@ import pinocchio as pin
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
 from evoexp.collision.covers.body_covers import Cover, inner_balls
 from evoexp.collision.scene import obstacle_shapes
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import (
     ANGLE,
@@ -38,12 +38,6 @@ from evoexp.scenarios.posture_task import (
 )
 
 
-def _demand(holds: bool, field: str, must: str, was: object) -> None:
-    """Refuse a setting of which something does not hold."""
-    if not holds:
-        raise SettingError(field, must, was)
-
-
 def prepare(
     robot: Robot,
     scenario: PostureTask | MoveitTask,
@@ -55,18 +49,18 @@ def prepare(
     assembly = robot.build()
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
-    _demand(assembly.num_arms == 1, "robot", "one arm", f"{assembly.num_arms} arms")
+    demand(assembly.num_arms == 1, "robot", "one arm", f"{assembly.num_arms} arms")
     task = posture_task(assembly, scenario)
     limits = _limits(assembly)
     start = _start(task, assembly, limits)
     must = f"one number, or one per joint ({len(start)})"
-    _demand(len(scope) in (1, len(start)), "planner.scope", must, list(scope))
+    demand(len(scope) in (1, len(start)), "planner.scope", must, list(scope))
     obstacles = obstacle_table(task.objects).without_ellipses()
     bodies = _bodies(robot, collision, assembly.disabled)
     tool = assembly.tools[0]
     for k, name in enumerate(task.names):
         must = "a name that no body of the robot has"
-        _demand(name not in bodies.names, f"scenario.obstacles[{k}].name", must, name)
+        demand(name not in bodies.names, f"scenario.obstacles[{k}].name", must, name)
     problem = Problem(
         assembly,
         bodies,
@@ -147,21 +141,21 @@ def _limits(assembly: Assembly) -> FloatArray:
         low, high = limits[model.idx_qs[joint]]
         must = "given for every joint: postures are drawn between them, and margins rated"
         is_given = abs(low) < 1e6 and abs(high) < 1e6 and low < high
-        _demand(is_given, "robot.joint_limits", must, f"none for joint '{model.names[joint]}'")
+        demand(is_given, "robot.joint_limits", must, f"none for joint '{model.names[joint]}'")
     return limits
 
 
 def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatArray:
     nq = assembly.model.nq
     must = f"one value per joint ({nq})"
-    _demand(len(task.q_start) == nq, "scenario.q_start", must, len(task.q_start))
+    demand(len(task.q_start) == nq, "scenario.q_start", must, len(task.q_start))
     # model units per unit of the scenario: degrees, lengths of sliding joints
     units = np.where(assembly.table.slides, 1.0, DEGREE)
     start = np.array(task.q_start) * units
     for k, (value, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
         must = f"within the joint's limits, {least / units[k]:g} to {greatest / units[k]:g}"
         fits = bool(least <= value <= greatest)
-        _demand(fits, f"scenario.q_start[{k}]", must, task.q_start[k])
+        demand(fits, f"scenario.q_start[{k}]", must, task.q_start[k])
     return start
 
 
@@ -186,25 +180,25 @@ def _check_terms(
     """Refuse terms without a meaning for the goal of a phase, or that contradict it."""
     goal, where, counts = phase.goal, field.removesuffix("terms") + "goal", weights > 0.0
     must = "terms with goal_distance: every goal is a place"
-    _demand(counts[0], field, must, list(phase.terms))
+    demand(counts[0], field, must, list(phase.terms))
     must = f"a pose, since goal_angle rates its orientation (or {field} without it)"
-    _demand(not counts[ANGLE] or isinstance(goal, PoseGoal | ShiftGoal), where, must, goal.kind)
+    demand(not counts[ANGLE] or isinstance(goal, PoseGoal | ShiftGoal), where, must, goal.kind)
     must = "a point, since no goal_angle rates its orientation"
-    _demand(counts[ANGLE] or not isinstance(goal, PoseGoal), where, must, "pose")
+    demand(counts[ANGLE] or not isinstance(goal, PoseGoal), where, must, "pose")
     tilt, must = phase.upright_tolerance, "left out in a phase whose terms do not count upright"
     tilt_field = field.removesuffix("terms") + "upright_tolerance"
-    _demand(tilt is None or counts[UPRIGHT], tilt_field, must, tilt)
+    demand(tilt is None or counts[UPRIGHT], tilt_field, must, tilt)
     for term in (AXIAL, HEADING):
         must = f"the surface of an object, since {TERMS[term]} rates the way to it "
         must += f"(or {field} without it)"
-        _demand(not counts[term] or isinstance(goal, SurfaceGoal), where, must, goal.kind)
+        demand(not counts[term] or isinstance(goal, SurfaceGoal), where, must, goal.kind)
     if isinstance(goal, SurfaceGoal):
         kind = obstacles.kind[task.names.index(goal.object)]
         shape, of = task.objects[task.names.index(goal.object)].shape, f"{where}.object"
         has_surface = shape not in ("half_space", "hull")
-        _demand(has_surface, of, "a sphere, box, capsule or cylinder", shape)
+        demand(has_surface, of, "a sphere, box, capsule or cylinder", shape)
         must = "a cylinder or capsule, since axial_approach rates its axis"
-        _demand(not counts[AXIAL] or kind in (CYLINDER, CAPSULE), of, must, shape)
+        demand(not counts[AXIAL] or kind in (CYLINDER, CAPSULE), of, must, shape)
 
 
 def _covers(

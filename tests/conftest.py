@@ -61,10 +61,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(autouse=True, scope="session")
 def composed_once() -> Iterator[None]:
-    """Have Hydra compose no choice of options twice: a fifth of a second each time."""
-    from composed_once import compositions_remembered
+    """Have Hydra compose a choice of options once, as long as no option file changes: it is slow.
 
-    with compositions_remembered():
+    Nothing is remembered of what evoexp itself does with it.
+    """
+    from evoexp.configuration import compose
+    from evoexp.configuration.search_path import folders
+
+    compositions = dict[Any, compose.Composed]()
+    by_hydra = compose.Composer.by_hydra
+
+    def remembered(composer: Any, words: list[str]) -> compose.Composed:
+        roots = [composer.root, *(folder.path for folder in folders())]
+        files = [path for root in roots for path in root.glob("*/*.yaml")]
+        state = [(path.name, path.stat().st_mtime_ns) for path in sorted(files)]
+        key = (*words, composer.file, *(folder.path for folder in folders()), *state)
+        if key not in compositions:
+            compositions[key] = by_hydra(composer, words)
+        return compositions[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compose.Composer, "by_hydra", remembered)
         yield
 
 

@@ -7,6 +7,7 @@ import pytest
 from evoexp.errors import SettingError
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.testing import conditions
+from robots.robot_samples import REACH
 
 ROBOT = (
     '<robot name="r"><link name="a"/><joint name="j" type="continuous"><parent link="a"/>'
@@ -14,10 +15,6 @@ ROBOT = (
     '<mesh filename="package://hand/meshes/part.obj"/></geometry></collision></link></robot>'
 )
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-REACH = (
-    *("robot=urdf", "scenario=urdf_reach", "planner=posture_es", "ga=corsepius"),
-    *("objective=corsepius_reach", "collision=corsepius_spheres"),
-)
 
 
 def mesh(folder: Path, text: str = TETRAHEDRON) -> Path:

@@ -4,6 +4,7 @@ import functools
 import gc
 import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 # as in evoexp's workers: two test processes with two threads each wait for each other on two cores
@@ -83,6 +84,13 @@ def composed_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compose.Composer, "by_hydra", remembered)
         yield
+
+
+@pytest.fixture
+def outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return where the commands of this test write; not there yet."""
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
+    return tmp_path / "outputs"
 
 
 @pytest.fixture

@@ -21,7 +21,8 @@ ARRAYS = {
 }
 
 
-def saved(array: np.ndarray) -> bytes:
+def saved(array: np.ndarray | np.float64) -> bytes:
+    """Return a `.npy` file."""
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()

@@ -21,12 +21,6 @@ Failed = Callable[..., str]
 
 
 @pytest.fixture
-def outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
-    return tmp_path / "outputs"
-
-
-@pytest.fixture
 def failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Failed:
     """Return what runs a command that `os.fsync` fails from some call on; it says one line."""
 

@@ -14,13 +14,6 @@ from evoexp.store.run_directory import RunDirectory
 
 
 @pytest.fixture
-def outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return where the commands of this test write; not there yet."""
-    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
-    return tmp_path / "outputs"
-
-
-@pytest.fixture
 def evoexp(outputs: Path, capsys: pytest.CaptureFixture[str], blank_figures: None) -> Evoexp:
     """Return what runs a command; figures of its reports are blank."""
 

@@ -10,10 +10,10 @@ from command_samples import SERIAL, Evoexp, with_manifest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.commands.diff import changed
 from evoexp.shipped import shipped
 from evoexp.store.archive import pack
 from evoexp.store.log import SUMMARY
+from evoexp.store.manifest import changed
 from evoexp.store.run_directory import RunDirectory
 from forged_logs import with_metadata
 from store_lookup import find_runs

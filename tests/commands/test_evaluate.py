@@ -26,6 +26,7 @@ from evoexp.store.tables import read_summaries
 from hostile_data import mutated, refusal
 from matrix import counts, matrices_are_asked_for
 from shipped_conditions import Kind, of_kind
+from test_input_files import saved
 
 PLANAR = ("experiment=rana_planar", *SMALL)
 LABELS = ("via-point GA", "random search", "multi-start")
@@ -131,12 +132,6 @@ def with_value(value: Any) -> str:
     changed = json.loads(json.dumps(NESTED))
     changed[1][3][0] = value
     return json.dumps(changed)
-
-
-def saved(array: Any) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array)
-    return file.getvalue()
 
 
 def zipped() -> bytes:

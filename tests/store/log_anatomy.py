@@ -7,12 +7,13 @@ from io import BytesIO
 from typing import Any
 
 import orjson
+import xxhash
 import zstandard
 from mcap import records as mcap
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 
-from evoexp.store.digests import ContentDigest
+from evoexp.store.digests import message_bytes
 from evoexp.store.log import CONTENT_DIGEST, SUMMARY
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -133,7 +134,7 @@ def _entries(part: Part, body: bytes, offset: int) -> list[Record]:
 
 def _digest(parts: list[Part]) -> None:
     """Put the digest of the messages, as they are now, into the summary."""
-    digest, channels, schemas = ContentDigest(), dict[int, mcap.Channel](), dict[int, str]()
+    digest, channels, schemas = xxhash.xxh3_128(), dict[int, mcap.Channel](), dict[int, str]()
     chunks = [records(part.body) for part in parts if part.opcode == Opcode.CHUNK]
     for opcode, body in (record for chunk in chunks for record in chunk):
         if opcode == Opcode.SCHEMA:
@@ -144,7 +145,7 @@ def _digest(parts: list[Part]) -> None:
             number, sequence, log_time, _ = MESSAGE.unpack_from(body)
             own = channels[number]
             identity = (own.topic, schemas[own.schema_id], own.message_encoding)
-            digest.update(identity, log_time, sequence, body[MESSAGE.size :])
+            digest.update(message_bytes(identity, log_time, sequence, body[MESSAGE.size :]))
     for part in parts:
         if part.opcode == Opcode.METADATA:
             metadata = parsed(mcap.Metadata, part.body)

@@ -49,7 +49,7 @@ class Batch:
             curves: Folder for the convergence of running replicates; None: it is not told.
         """
         self._curves = curves
-        self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
+        self._settings, self._retry_failed = settings, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
             _, before, first_notes = self._wanted.get(condition.id, (condition, 0, notes))

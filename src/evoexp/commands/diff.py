@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
 from evoexp.errors import UnknownHash
 from evoexp.records import TIMES
 from evoexp.store.identity import TAKEN
-from evoexp.store.manifest import differences, leaves
+from evoexp.store.manifest import changed, differences
 from evoexp.store.run_context import typed_parts
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
@@ -60,14 +60,6 @@ def main(arguments: argparse.Namespace) -> int:
             say(f"{len(same)} of {len(common)} common replicates are the same, bit for bit")
     other = len(same) < len(common) or one.rows.keys() != two.rows.keys()
     return 1 if settings or environment or other else 0
-
-
-def changed(one: Any, two: Any) -> Iterator[tuple[str, Any, Any]]:
-    """Yield (dotted name, value, other value) where plain data differ; None: not there."""
-    before, after = dict(leaves(one)), dict(leaves(two))
-    for name in dict.fromkeys([*before, *after]):
-        if before.get(name) != after.get(name):
-            yield name, before.get(name), after.get(name)
 
 
 def _side(prefix: str) -> Side:

@@ -41,23 +41,22 @@ def main(arguments: argparse.Namespace) -> int:
         planner, problem = fitting[0].condition.prepare()
         lists = nested(fitting[0].solution, planner.shape(problem))
         write(arguments.write, json.dumps(lists).encode(), is_said=not arguments.json)
-    rows: list[dict[str, Any]] = []
-    listings: list[Listing | None] = []
+    judged: list[_Judged] = []
     for label, condition, solution, motion, remarks in fitting:
         planner, problem = condition.prepare()
         head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
         verdict = judge_motion(planner, problem, motion)._asdict()
         if remarks:  # of a trajectory a planner knows neither terms nor departures
-            rows.append(head | verdict | {DEPARTURES: [], REMARKS: list(remarks)})
-            listings.append(None)
+            judged.append((head | verdict | {DEPARTURES: [], REMARKS: list(remarks)}, None))
             continue
         terms = planner.evaluate(problem, solution)
         departures = list(planner.departures(problem, solution))
         of_task = {"solution_of_the_task": not departures}
-        rows.append(head | terms | of_task | verdict | {DEPARTURES: departures})
-        listings.append(planner.listing(problem, solution))
+        row = head | terms | of_task | verdict | {DEPARTURES: departures}
+        judged.append((row, planner.listing(problem, solution)))
+    rows = [row for row, _ in judged]
     if arguments.json:
-        for row, listing in zip(rows, listings, strict=True):
+        for row, listing in judged:
             if listing is not None:
                 names, cells = listing
                 row["rows"] = [dict(zip(names, values, strict=True)) for values in cells]
@@ -65,7 +64,7 @@ def main(arguments: argparse.Namespace) -> int:
         return 0
     # conditions of one group say the same of the motion
     alike: dict[str, list[_Judged]] = {}
-    for row, listing in zip(rows, listings, strict=True):
+    for row, listing in judged:
         said = {name: value for name, value in row.items() if name not in HEAD[:2]}
         alike.setdefault(repr((said, listing)), []).append((row, listing))
     groups = list(alike.values())

@@ -165,10 +165,8 @@ def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
     if runs:
         name = folder_name([*runs], "_runs")
         return [ReportRequest(build.Request(name, "", "", tuple(runs.items())), settings, None)]
-    return [
-        request_of(experiment, overrides, arguments.multirun, arguments.only, arguments.config_dir)
-        for experiment in experiments
-    ]
+    again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
+    return [request_of(experiment, overrides, again) for experiment in experiments]
 
 
 def folder_name(parts: Sequence[str], noun: str = "") -> str:
@@ -180,19 +178,18 @@ def folder_name(parts: Sequence[str], noun: str = "") -> str:
 
 
 def request_of(
-    experiment: Experiment,
-    overrides: Sequence[str],
-    multirun: bool = False,
-    only: Sequence[str] = (),
-    config_dir: Sequence[str] = (),
+    experiment: Experiment, overrides: Sequence[str], again: Sequence[str] = ()
 ) -> ReportRequest:
-    """Return the report of one experiment, whose command repeats the words that were typed."""
+    """Return the report of one experiment, whose command repeats the words that were typed.
+
+    Behind the overrides come the words of the options, see `option_words`.
+    """
     files = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
     words = [experiment.name] if experiment.name in options("experiment") else []
     words = files if any(map(is_file, files)) else words
     words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
     words += [word for word in overrides if word.split("=")[0] not in _SILENT]
-    words += option_words(multirun, only, config_dir)
+    words += again
     request = build.Request(
         experiment.report_name,
         experiment.name,

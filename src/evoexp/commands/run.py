@@ -133,7 +133,8 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
 
     def drawn(experiment: Experiment) -> str:
         say(summary_table(experiment))
-        asked = (arguments.overrides, arguments.multirun, arguments.only, arguments.config_dir)
+        again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
+        asked = arguments.overrides, again
         directory = outputs_root() / "reports" / experiment.report_name
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):

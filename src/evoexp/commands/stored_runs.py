@@ -1,6 +1,7 @@
 """Stored runs as commands name them: by a prefix of a hash."""
 
 import itertools
+from collections.abc import Iterator
 from pathlib import Path
 
 from evoexp import shipped
@@ -13,15 +14,13 @@ from evoexp.store.run_directory import RunDirectory, open_run, outputs_root, res
 MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
 
 
-def stored_runs(outputs: Path) -> list[tuple[str, RunDirectory | EvoexpError]]:
-    """Return all stored runs by name; in place of a damaged one, its error."""
-    runs: dict[str, RunDirectory | EvoexpError] = {}
+def stored_runs(outputs: Path) -> Iterator[tuple[str, RunDirectory | EvoexpError]]:
+    """Yield all stored runs with their names; in place of a damaged one, its error."""
     for name in run_names(outputs):
         try:
-            runs[name] = open_run(outputs, name)
+            yield name, open_run(outputs, name)
         except EvoexpError as error:
-            runs[name] = error
-    return list(runs.items())
+            yield name, error
 
 
 def stored_run(prefix: str) -> RunDirectory:

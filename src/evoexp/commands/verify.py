@@ -1,9 +1,9 @@
 """`evoexp verify`: whether a store is whole, and the commands that mend it."""
 
 import argparse
-import contextlib
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 from evoexp import shipped
@@ -31,7 +31,8 @@ def main(arguments: argparse.Namespace) -> int:
     names = names or run_names(outputs)
     checks = [check_run(outputs, name) for name in dict.fromkeys(names)]
     with plain_console().status("checking logs"):
-        found = [_checked(each, logs) for each, logs in zip(checks, _all_logs(checks), strict=True)]
+        logs_of = _all_logs(checks)
+        found = [_checked(each, logs_of[each.hash]) for each in checks]
     damaged = [run for run in found if run.problems]
     if arguments.json:
         print_json([{name: getattr(run, name) for name in RUN_KEYS} for run in found])
@@ -59,22 +60,19 @@ def main(arguments: argparse.Namespace) -> int:
     return 1 if damaged else 0
 
 
-def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
-    """Yield the checks of every run's logs; those of large stores come from worker processes."""
-    stored = [sorted(check.run.completed()) if check.run else [] for check in runs]
-    tasks = [
-        (check.run.log_path(k), check.run.condition_id)
-        for check, replicates in zip(runs, stored, strict=True)
-        if check.run
-        for k in replicates
-    ]
-    with contextlib.ExitStack() as stack:
-        checks: Iterable[LogCheck] = itertools.starmap(_check, tasks)
-        if len(tasks) >= MANY or sum(path.lstat().st_size for path, _ in tasks) >= LARGE:
-            workers = stack.enter_context(Workers(min(num_cores(), len(tasks))))
-            checks = iter(in_order(workers, _check, tasks))
-        for replicates in stored:
-            yield list(itertools.islice(checks, len(replicates)))
+def _all_logs(runs: Sequence[RunCheck]) -> dict[str, list[LogCheck]]:
+    """Return the checks of every run's logs by its hash; worker processes check large stores."""
+    stored = [(check.run, k) for check in runs if check.run for k in sorted(check.run.completed())]
+    tasks = [(run.log_path(k), run.condition_id) for run, k in stored]
+    if len(tasks) >= MANY or sum(path.lstat().st_size for path, _ in tasks) >= LARGE:
+        with Workers(min(num_cores(), len(tasks))) as workers:
+            checks = in_order(workers, _check, tasks)
+    else:
+        checks = list(itertools.starmap(_check, tasks))
+    logs = defaultdict[str, list[LogCheck]](list)
+    for (run, _), check in zip(stored, checks, strict=True):
+        logs[run.hash12].append(check)
+    return logs
 
 
 def _check(path: Path, condition_id: str) -> LogCheck:

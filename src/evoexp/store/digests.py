@@ -50,20 +50,12 @@ def array_bytes(array: NDArray[Any]) -> bytes:
     return array.tobytes()
 
 
-class ContentDigest:
-    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
+def message_bytes(
+    channel: tuple[str, str, str], log_time: int, sequence: int, data: bytes
+) -> bytes:
+    """Return a message as the content digest takes it: its channel, time, sequence and data.
 
-    def __init__(self) -> None:
-        """Start with no message."""
-        self._hash = xxhash.xxh3_128()
-
-    def update(
-        self, channel: tuple[str, str, str], log_time: int, sequence: int, data: bytes
-    ) -> None:
-        """Append one message of a channel: its topic, schema's name, and message encoding."""
-        self._hash.update("\0".join((*channel, "")).encode())
-        self._hash.update(_MESSAGE.pack(log_time, sequence, len(data)) + data)
-
-    def hexdigest(self) -> str:
-        """Return the digest so far as 32 hex digits."""
-        return self._hash.hexdigest()
+    The channel is told by topic, schema's name, and message encoding; the digest is xxh3-128.
+    """
+    head = "\0".join((*channel, "")).encode()
+    return head + _MESSAGE.pack(log_time, sequence, len(data)) + data

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import xxhash
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
-from evoexp.store.digests import Chain, ContentDigest, array_bytes
+from evoexp.store.digests import Chain, array_bytes, message_bytes
 from evoexp.store.log_bounds import MAX_LOG
 from evoexp.store.messages import (
     encode,
@@ -80,7 +81,7 @@ class Log:
         """
         self._environment = dict(environment or {})
         self._chain = Chain(rng)
-        self._content = ContentDigest()
+        self._content = xxhash.xxh3_128()
         self._channels: dict[str, tuple[int, str]] = {}  # id and name of schema, by topic
         self._num_messages = Counter[str]()  # by topic
         self._last = -1  # index of the last generation
@@ -188,4 +189,4 @@ class Log:
         self._num_messages[topic] += 1
         log_time = int(generation) * _TICK
         self._writer.add_message(channel, log_time, data, self._cpu_ns, sequence)
-        self._content.update((topic, name, "json"), log_time, sequence, data)
+        self._content.update(message_bytes((topic, name, "json"), log_time, sequence, data))

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import orjson
+import xxhash
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
 from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store.digests import ContentDigest
+from evoexp.store.digests import message_bytes
 from evoexp.store.log_bounds import MAX_LOG, CheckedLog, check, unreadable_is_corrupt
 from evoexp.store.messages import (
     NONFINITE,
@@ -111,11 +112,12 @@ def read_log(source: Source, place: Place | None = None) -> LogContents:
     """
     with _opened(source) as log:
         rows: dict[str, list[Any]] = {topic: [] for topic in _RECORDS}
-        digest, cpu_ns = ContentDigest(), list[int]()
+        digest, cpu_ns = xxhash.xxh3_128(), list[int]()
         for schema, channel, message in log.reader.iter_messages(log_time_order=False):
             name = schema.name if schema is not None else ""
             identity = (channel.topic, name, channel.message_encoding)
-            digest.update(identity, message.log_time, message.sequence, message.data)
+            whole = message_bytes(identity, message.log_time, message.sequence, message.data)
+            digest.update(whole)
             if channel.topic in rows:
                 row = decode(_RECORDS[channel.topic], orjson.loads(message.data))
                 rows[channel.topic].append(row)

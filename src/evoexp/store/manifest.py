@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import metadata
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -85,16 +86,22 @@ def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Differen
     Only sections that both have are compared; of two lists, entries that the other lacks are named.
     """
     shared = was.keys() & now.keys() - {"condition"}
-    before = dict(leaves({name: was[name] for name in shared}))
-    after = dict(leaves({name: now[name] for name in shared}))
+    before, after = ({name: each[name] for name in shared} for each in (was, now))
     entries = []
-    for name in sorted(before.keys() | after.keys()):
-        old, new = before.get(name), after.get(name)
-        if isinstance(old, list) and isinstance(new, list) and old != new:
+    for name, old, new in sorted(changed(before, after), key=itemgetter(0)):
+        if isinstance(old, list) and isinstance(new, list):
             old, new = [x for x in old if x not in new], [x for x in new if x not in old]
         if old != new:
             entries.append(Difference(name, old, new))
     return entries
+
+
+def changed(one: Any, two: Any) -> Iterator[tuple[str, Any, Any]]:
+    """Yield (dotted name, value, other value) where plain data differ; None: not there."""
+    before, after = dict(leaves(one)), dict(leaves(two))
+    for name in dict.fromkeys([*before, *after]):
+        if before.get(name) != after.get(name):
+            yield name, before.get(name), after.get(name)
 
 
 def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:

@@ -1,9 +1,11 @@
 """Joint trajectories out of files: matched by name, in known units, or refused in one line."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from evoexp.input_files import TableError
 from evoexp.playback.recording import Joint
@@ -70,29 +72,16 @@ def test_velocities_of_all_joints_make_cubics() -> None:
     assert of_csv(degrees)[0].coefficients[1, 1, 0] == pytest.approx(np.radians(0.5))
 
 
+REFUSED: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("refused_files.yaml").read_text())
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (table("turn_rad,turn_2_rad", [[0, 0]] * 2), "lacks joints slide .* named slide_m"),
-        (table("turn_rev,turn_2_rad,slide_m", Q), "lacks joints turn .* has .*turn_rev"),
-        (table("turn,turn_2,slide", [[90, 0, 0]] * 2), "turn: 90 without a unit .* turn_deg or"),
-        (table("turn_m,turn_2,slide", Q), "turn: must be in rad .*, was in m"),
-        (table("turn,turn_2,slide_rad", Q), "slide: must be in m .*, was in rad"),
-        (table("turn,turn_rad,turn_2,slide", [[0] * 4] * 2), "turn_rad: a second column of joint"),
-        (table("turn,turn_2,slide", Q[:1]), "must have two points or more, has 1"),
-        (table("turn,turn_2,slide", []), "must have two points or more, has 0"),
-        (table("time,turn,turn_2,slide", [[k, *q] for k, q in zip((0, 1, 1), Q, strict=True)]),
-         "times must grow from point to point: 1 s at point 3"),
-        (table("turn,turn_2,slide_m", [[0, 0, 1e8]] * 2), r"slide: must be at most 1e\+07"),
-        (table("turn,turn_2,slide", [[0, "", 0]]), "line 2: must be a number in column turn_2"),
-        (table("turn,turn_2,slide", [[0, "nan", 0]]), "line 2: must be a number in column"),
-        (table("turn,turn,slide", Q), "line 1: must be a head with a name per column, each once"),
-        (table("0,0.5,0.1", Q), "line 1: must be a head with a name per column"),
-        (table("time_h,turn", [[0, 0]]), "line 1: must be a time in s, ms, us or ns"),
-        (table("turn,slide", [["0", "1,5"]]), "line 2: must be 2 cells, as in the first line"),
+        *((text.encode(), said) for text, said in REFUSED["tables"].items()),
         ("turn,slide\n0,0\n".encode("utf-16"), "line 1: must be text in UTF-8"),
     ],
-)  # fmt: skip
+)
 def test_a_table_that_does_not_fit_is_refused(content: bytes, said: str) -> None:
     with pytest.raises((ValueError, TableError), match=said) as caught:
         of_csv(content)
@@ -132,22 +121,7 @@ def test_accelerations_are_told_not_to_be_read() -> None:
     assert still[-1] == "straight lines between the points"
 
 
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
-        ({"positions": Q}, "must have joint_names and points, as a JointTrajectory, has positions"),
-        (message(points(), ("turn", "turn", "slide")), "joint_names must be names, each once"),
-        (message(points(), ("turn", "slide")), r"points\[0\].positions must be 2 numbers"),
-        (message(points(), units=["rad"]), "units must be 3, one per joint"),
-        (message([{"velocities": Q[0]}]), r"points\[0\].positions must be 3 numbers.* was 0"),
-        (message([{"positions": [0, None, 0]}]), r"points\[0\].positions must be finite numbers"),
-        (message([{"positions": [0, True, 0]}]), r"points\[0\].positions must be finite numbers"),
-        (message([{"positions": [0, np.inf, 0]}]), r"points\[0\].positions must be finite"),
-        (message([*points(), {"positions": Q[0], "velocities": Q[0]}]), r"points\[0\].velocities"),
-        (message([7]), r"points\[0\].positions must be a list"),
-        (message(points(time_from_start="soon")), r"points\[0\].time_from_start must be finite"),
-    ],
-)
+@pytest.mark.parametrize(("data", "said"), [each.values() for each in REFUSED["messages"]])
 def test_a_bad_message_is_refused_by_place(data: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said) as caught:
         read_message(data)

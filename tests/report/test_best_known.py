@@ -4,18 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from composed import script
 from evoexp.errors import EvoexpError
 from evoexp.report.figures.effort_curves import share_table
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.best_known import (
-    BestKnown,
-    parsed,
-    read_best_known,
-    shipped_best_known,
-)
+from evoexp.report.results.best_known import BestKnown, parsed, read_best_known, shipped_best_known
 from evoexp.report.results.planner_runs import MULTIPLES, of_results, problem_key
 from evoexp.report.results.stored_results import Results
 
@@ -38,32 +34,12 @@ def test_what_is_written_is_read(update: Any) -> None:
     assert text == update.to_yaml(shipped_best_known())
 
 
-KEYS = "must be keys of 12 hex digits in quotation marks, was "
-ENTRY = '{problem: a, length: 1.0, run: "0123456789ab", replicate: 0}'
+REFUSED: dict[str, str] = yaml.safe_load(
+    Path(__file__).with_name("refused_data.yaml").read_text(encoding="utf-8")
+)["best_known"]
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("- 1", "f.yaml: must be a mapping of keys of problems"),
-        ("a: [", "f.yaml: must be YAML"),
-        (f"box_panda: {ENTRY}", f"{KEYS}'box_panda'"),
-        (f"123456789012: {ENTRY}", f"{KEYS}123456789012"),
-        ('"123456789012": 3.0', "123456789012: must be a mapping of problem, length, run, replica"),
-        *(
-            (f'"123456789012": {ENTRY.replace(right, wrong)}', said)
-            for right, wrong, said in (
-                ("1.0", "-1.0", "length: must be greater than 0.0, was -1.0"),
-                ("1.0", ".inf", "length: must be a finite number"),
-                ("1.0", "true", "length: must be a number"),
-                ("89ab", "89", "run: must be "),
-                (": 0}", ": -1}", "replicate: must be at least 0"),
-                (", replicate: 0", "", "replicate: must be given"),
-                ("replicate: 0", "replicate: 0, by: me", "123456789012.by: unknown setting"),
-            )
-        ),
-    ],
-)
+@pytest.mark.parametrize(("text", "said"), REFUSED.items())
 def test_what_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "f.yaml"
     path.write_text(text)

@@ -1,6 +1,7 @@
 """Ranks over problems: against printed numbers of Demšar (2006), and against plain counts."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,25 +29,7 @@ from evoexp.report.statistics.problem_ranks import (
 )
 from report_samples import made_up_runs
 
-# Demšar 2006, Tab. 6: areas under the curve of four classifiers on fourteen data sets
-AREAS = np.array(
-    [
-        [0.763, 0.768, 0.771, 0.798],
-        [0.599, 0.591, 0.590, 0.569],
-        [0.954, 0.971, 0.968, 0.967],
-        [0.628, 0.661, 0.654, 0.657],
-        [0.882, 0.888, 0.886, 0.898],
-        [0.936, 0.931, 0.916, 0.931],
-        [0.661, 0.668, 0.609, 0.685],
-        [0.583, 0.583, 0.563, 0.625],
-        [0.775, 0.838, 0.866, 0.875],
-        [1.000, 1.000, 1.000, 1.000],
-        [0.940, 0.962, 0.965, 0.962],
-        [0.619, 0.666, 0.614, 0.669],
-        [0.972, 0.981, 0.97501, 0.975],  # printed 0.975 twice, and ranked second and third
-        [0.957, 0.978, 0.946, 0.970],
-    ]
-)
+AREAS = np.loadtxt(Path(__file__).with_name("demsar_areas.csv"), delimiter=",", encoding="utf-8")
 COSTS = st.sampled_from([1.0, 2.0, 3.0, 4.0, np.inf])
 TABLES = arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS)
 

@@ -12,14 +12,8 @@ from evoexp.records import FloatArray
 from evoexp.report.figures import marks, style
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
+from evoexp.report.statistics import problem_ranks
 from evoexp.report.statistics.inference import quantiles
-from evoexp.report.statistics.problem_ranks import (
-    Standing,
-    alike,
-    critical_difference,
-    effort_ratios,
-    friedman,
-)
 
 POINTS = 200  # along the axis of effort
 MAX_PANELS = 24  # problems that have a panel of their own
@@ -160,9 +154,9 @@ def draw_steps(
     style.log_axis(axes, first, max(last, 1.01 * first))
 
 
-def profiles_table(found: Standing) -> pd.DataFrame:
+def profiles_table(found: problem_ranks.Standing) -> pd.DataFrame:
     """Return the performance profile of each planner, at every ratio at which one rises."""
-    ratios = effort_ratios(found.efforts)
+    ratios = problem_ranks.effort_ratios(found.efforts)
     steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
     axis = np.append(steps, max(END * steps[-1], 2.0))
     rows = [
@@ -184,12 +178,12 @@ def draw_profiles(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def critical_difference_table(found: Standing, significance: float) -> pd.DataFrame:
+def critical_difference_table(found: problem_ranks.Standing, significance: float) -> pd.DataFrame:
     """Return mean ranks, best first, with the critical difference."""
     table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
     table["problems"] = len(found.problems)
-    table["friedman_p"] = friedman(found.lengths).p_value
-    table["critical_difference"] = critical_difference(
+    table["friedman_p"] = problem_ranks.friedman(found.lengths).p_value
+    table["critical_difference"] = problem_ranks.critical_difference(
         len(found.planners), len(found.problems), significance
     )
     return table.sort_values("mean_rank", kind="stable", ignore_index=True)
@@ -198,7 +192,7 @@ def critical_difference_table(found: Standing, significance: float) -> pd.DataFr
 def draw_critical_difference(table: pd.DataFrame) -> Figure:
     """Draw mean ranks on a line; a bar joins planners that do not differ significantly."""
     ranks, difference = table["mean_rank"].tolist(), float(table["critical_difference"].iloc[0])
-    groups, count = alike(ranks, difference), len(ranks)
+    groups, count = problem_ranks.alike(ranks, difference), len(ranks)
     left = (count + 1) // 2  # planners named on the left
     foot = BAR * (len(groups) + 1) + LINE * left  # [inch] below the axis
     figure = style.figure(ABOVE + foot)

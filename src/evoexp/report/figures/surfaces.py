@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.playback.shapes import Outline
 from evoexp.records import FloatArray
 
@@ -100,15 +101,11 @@ def outline_from_above(triangles: FloatArray) -> FloatArray:
 
 def _hull(points: FloatArray) -> FloatArray:
     """Return the hull's triangles, each counter-clockwise as seen from outside; none if flat."""
-    try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
+    hull = hull_of(points)
+    if hull is None:
         return np.empty((0, 3, 3))
-    triangles = points[hull.simplices]
-    a, b, c = triangles.transpose(1, 0, 2)
-    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
-    triangles[inward] = triangles[inward, ::-1]
-    return np.asarray(triangles)
+    corners, triangles = hull
+    return np.asarray(corners[triangles])
 
 
 def space(

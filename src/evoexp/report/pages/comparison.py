@@ -22,22 +22,8 @@ from evoexp.report.results.given_data import GivenData
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import inference, problem_ranks
 from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
-from evoexp.report.statistics.inference import (
-    Interval,
-    Proportion,
-    Spread,
-    expected_effort,
-    expected_interval,
-    quantile,
-    spread,
-)
-from evoexp.report.statistics.problem_ranks import (
-    Standing,
-    critical_difference,
-    friedman,
-    standing,
-)
 
 CSV_COLUMNS = [
     *("planner", "problem", "n", "proven", "effort", "effort_low", "effort_high"),
@@ -56,8 +42,8 @@ class Rated(NamedTuple):
     # Median of the queries to the first answer that the planner's own model accepts
     first_own: float
     queries: float  # expected running time to a proven answer [collision queries]
-    interval: Interval  # of it, by bootstrap
-    lengths: Spread  # best proven length of a run: median and quartiles [rad, m]
+    interval: inference.Interval  # of it, by bootstrap
+    lengths: inference.Spread  # best proven length of a run: median and quartiles [rad, m]
     straight: float  # distance from start to goal; NaN where goals differ
     # Length of the shortest proven answer known of the problem; NaN: none is stored
     best_known: float
@@ -69,7 +55,7 @@ class Rated(NamedTuple):
     evaluations: float = np.nan  # expected evaluations to a proven answer
     cpu_s: float = np.nan  # expected CPU time to a proven answer [s]
     # The planner's own cost of its last solution: median and quartiles over runs
-    own_cost: Spread = Spread(np.nan, np.nan, np.nan, 0)
+    own_cost: inference.Spread = inference.Spread(np.nan, np.nan, np.nan, 0)
 
 
 def page(
@@ -91,7 +77,7 @@ def page(
     return own_page("comparison", results, settings, runs=runs, given=given)
 
 
-ranks = standing
+ranks = problem_ranks.standing
 compared_conditions = stored_conditions
 
 
@@ -108,9 +94,9 @@ def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
             runs=len(own.replicates),
             proven=int(reached.sum()),
             first_own=np.nan,
-            queries=expected_effort(effort, reached),
-            interval=expected_interval(effort, reached, *levels),
-            lengths=spread(own.best_lengths),
+            queries=inference.expected_effort(effort, reached),
+            interval=inference.expected_interval(effort, reached, *levels),
+            lengths=inference.spread(own.best_lengths),
             straight=own.problem.straight,
             best_known=own.problem.best_known,
             unit=own.problem.unit,
@@ -127,14 +113,14 @@ def _with_coins(row: Rated, own: PlannerRuns, condition: ConditionResults) -> Ra
     first = solved.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
     spent = {"evaluations": condition.column("evaluations"), "cpu_s": search_seconds(condition)}
     per_answer: dict[str, Any] = {
-        name: expected_effort(*own.first_reached(effort=name, spent=whole))
+        name: inference.expected_effort(*own.first_reached(effort=name, spent=whole))
         for name, whole in spent.items()
         if not own.table[name].isna().any()
     }
     return row._replace(
-        first_own=quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5),
+        first_own=inference.quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5),
         body_tests=num_body_tests(condition.prepared.problem),
-        own_cost=spread(condition.column("best_cost")),
+        own_cost=inference.spread(condition.column("best_cost")),
         **per_answer,
     )
 
@@ -157,11 +143,11 @@ def answer_rows(rated: Sequence[Rated], settings: ReportSettings) -> Iterator[tu
     """Yield each condition's proven answers: how many, their effort and their lengths."""
     for row in rated:
         median, lower, upper, count = row.lengths
-        in_units = Spread(median / row.unit, lower / row.unit, upper / row.unit, count)
+        in_units = inference.Spread(median / row.unit, lower / row.unit, upper / row.unit, count)
         yield (
             row.condition,
             row.runs,
-            Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
+            inference.Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
             markdown.number(row.first_own),
             f"{effort_text(row.queries)} ({' to '.join(map(effort_text, row.interval))})",
             markdown.spread(row.lengths),
@@ -201,7 +187,7 @@ def compared_lengths(
     return (("best proven length", tuple(adjusted(rows))),) if rows else ()
 
 
-def rank_rows(ranks: Standing) -> list[tuple[str, ...]]:
+def rank_rows(ranks: problem_ranks.Standing) -> list[tuple[str, ...]]:
     """Return mean ranks, best first; none where there is but one planner, or one problem."""
     if not ranks.can_be_profiled:
         return []
@@ -252,12 +238,13 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "left_out": lambda ranks: ", ".join(ranks.left_out),
     "outsiders": lambda ranks: ", ".join(ranks.outsiders),
-    "friedman_test": lambda ranks: friedman(ranks.lengths),
+    "friedman_test": lambda ranks: problem_ranks.friedman(ranks.lengths),
     "ranks_differ": lambda ranks, settings: (
-        ranks.can_be_tested and friedman(ranks.lengths).p_value < settings.significance
+        ranks.can_be_tested
+        and problem_ranks.friedman(ranks.lengths).p_value < settings.significance
     ),
     "ranks_are_alike": lambda ranks, ranks_differ: ranks.can_be_tested and not ranks_differ,
-    "nemenyi": lambda ranks, settings: critical_difference(
+    "nemenyi": lambda ranks, settings: problem_ranks.critical_difference(
         len(ranks.planners), len(ranks.problems), settings.significance
     ),
     # problems that no planner has a proven answer on

@@ -9,12 +9,10 @@ from evoexp.report.pages import markdown
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, Values, by_column, compared
+from evoexp.report.statistics.comparisons import Comparison, Pair, Values, by_column, compared
 from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 
 MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
-
-Pair = tuple[ConditionResults, ConditionResults]
 
 
 EFFORTS: dict[str, Values] = {  # quantities that every planner records; lower is better

@@ -6,7 +6,7 @@ than one.
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -192,45 +192,24 @@ def contact(
     return float(x), float(y)
 
 
-class Extremes(NamedTuple):
-    """The least and the greatest value at each instant, and the configurations that have them."""
-
-    lowest: FloatArray  # (instants,); inf where nothing was seen
-    highest: FloatArray  # (instants,); −inf where nothing was seen
-    at_lowest: FloatArray  # (nq, instants), of the first replicate of several
-    at_highest: FloatArray  # (nq, instants), of the first replicate of several
-
-
 def extremes(
-    replicates: Sequence[int], sampled: Callable[[int], FloatArray], measures: Sequence[Measure]
-) -> tuple[Extremes, ...]:
-    """Return the extremes of several quantities over replicates, one at least.
-
-    `sampled` gives a replicate's motion, (nq, instants).
-    """
-    least: list[tuple[FloatArray, FloatArray]] = []  # of each quantity, and of its negative
-    for replicate in replicates:
-        q = sampled(replicate)
-        own = [(sign * values, q) for values in (m(q) for m in measures) for sign in (1.0, -1.0)]
-        least = [_least(*each) for each in zip(least, own, strict=True)] if least else own
-    pairs = zip(least[::2], least[1::2], strict=True)
-    return tuple(Extremes(low, -high, at_low, at_high) for (low, at_low), (high, at_high) in pairs)
-
-
-def _least(
-    *both: tuple[FloatArray, FloatArray],
+    replicates: Sequence[int], sampled: Callable[[int], FloatArray], measure: Measure
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the lesser of two values at each instant, with its configurations."""
-    length = max(len(values) for values, _ in both)
-    (first, q), (later, q_later) = (
-        (
-            np.pad(values, (0, length - len(values)), constant_values=np.inf),
-            np.pad(q, ((0, 0), (0, length - len(values)))),
-        )
-        for values, q in both
-    )
-    lower = later < first
-    return np.where(lower, later, first), np.where(lower, q_later, q)
+    """Return the configurations of the least and of the greatest value at each instant.
+
+    Both are (nq, instants), of the first replicate of several; `sampled` gives a replicate's
+    motion, (nq, instants), and all are equally long.
+    """
+    first, *others = replicates
+    at_lowest = at_highest = sampled(first)
+    lowest = highest = measure(at_lowest)
+    for replicate in others:
+        q = sampled(replicate)
+        values = measure(q)
+        at_lowest = np.where(values < lowest, q, at_lowest)
+        at_highest = np.where(values > highest, q, at_highest)
+        lowest, highest = np.minimum(lowest, values), np.maximum(highest, values)
+    return at_lowest, at_highest
 
 
 def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:

@@ -10,13 +10,7 @@ from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
-from evoexp.report.statistics.inference import (
-    Effect,
-    effect,
-    holm,
-    quantile,
-    runs_for_effect,
-)
+from evoexp.report.statistics.inference import Effect, effect, holm, quantile, runs_for_effect
 
 Values = Callable[[ConditionResults], FloatArray]
 Pair = tuple[ConditionResults, ConditionResults]

@@ -12,12 +12,7 @@ from evoexp.report.results.parameters import option, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules, registered_rules
 from evoexp.report.statistics.comparisons import Comparison, Values, compared
-from evoexp.report.statistics.inference import (
-    Proportion,
-    fisher_exact,
-    newcombe,
-    runs_for_shares,
-)
+from evoexp.report.statistics.inference import Proportion, fisher_exact, newcombe, runs_for_shares
 from evoexp.shipped import config_directory, shipped
 
 REPRODUCED, CONTRADICTED, EQUAL = "reproduced", "contradicted", "practically equal"

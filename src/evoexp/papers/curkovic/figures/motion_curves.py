@@ -89,8 +89,8 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
         distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
         quick = motion_geometry.distance_measure(scene, distance)
         sampled = partial(_sampled, c, samples=samples)
-        (extremes,) = motion_geometry.extremes(list(c.solutions), sampled, [quick])
-        series = {LOWEST: extremes.at_lowest, HIGHEST: extremes.at_highest}
+        lowest, highest = motion_geometry.extremes(list(c.solutions), sampled, quick)
+        series = {LOWEST: lowest, HIGHEST: highest}
         series |= {BEST: sampled(measures.exemplar(c)), STRAIGHT: sampled(None)}
         for name, q in series.items():
             columns: dict[str, Any] = {"condition": c.label, "position": position, "series": name}

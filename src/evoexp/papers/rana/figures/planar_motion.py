@@ -160,13 +160,13 @@ def distances_table(condition: ConditionResults, samples: int) -> pd.DataFrame:
     for kind, (pairs, margin) in measures.kinds_of_pairs(condition).items():
         own = exact[exact["kind"] == kind]
         for measure, (exactly, quickly) in _measures(condition, kind, pairs).items():
-            (ranges,) = motion_geometry.extremes(
-                list(solutions), lambda replicate: sampled(solutions[replicate]), [quickly]
+            lowest, highest = motion_geometry.extremes(
+                list(solutions), lambda replicate: sampled(solutions[replicate]), quickly
             )
             places = {
                 BEST: sampled(solutions[condition.best_replicate]),
-                LOWEST: ranges.at_lowest,
-                HIGHEST: ranges.at_highest,
+                LOWEST: lowest,
+                HIGHEST: highest,
                 STRAIGHT: sampled(measures.straight_line(condition)),
             }
             # series → its instants, and the distance at each

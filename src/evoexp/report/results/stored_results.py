@@ -211,6 +211,7 @@ class Results(NamedTuple):
     budget: str  # name of the budget; empty for runs given by their hashes
     conditions: tuple[ConditionResults, ...]  # in the order of the experiment
     outputs: Path = Path()  # root of the outputs that they were read from
+    as_written: bool = False  # whether the experiment was asked for without overrides
 
     @property
     def with_data(self) -> tuple[ConditionResults, ...]:

@@ -30,7 +30,7 @@ PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").g
 MENU = ROOT / "scripts/mkdocs.yml"
 NOTEBOOK = ROOT / "docs/remake_a_figure.ipynb"
 RUN = {"bash": "commands", "python": "code", "sql": "queries"}  # languages of blocks that are run
-FILES = {"xml", "yaml", "csv", "ini"}  # of blocks that are files: `title="…"` names each
+FILES = {"xml", "yaml", "csv", "ini", "python"}  # of blocks that are files: `title="…"` names each
 # Commands that the tests of this module leave out, each with the reason.
 LEFT_OUT = {
     "git clone": "only the reader knows the address",
@@ -40,6 +40,7 @@ LEFT_OUT = {
     "my_env/bin/activate": "the same",
     "my_search": "a package that is installed: tests/test_guest_package.py",
     "my_swap": "the same",
+    "my_swarm": "the same",
     "HASH": "a run of that package: tests/test_guest_package.py",
     "tcp:": "a cluster: tests/batch/test_cluster.py",
     "scripts/test": "the command that runs this very test",
@@ -87,7 +88,7 @@ def without_blocks(page: Path) -> str:
 
 def write_files(page: Path, folder: Path) -> None:
     """Write the files that a page shows."""
-    for block in blocks(page, *FILES):
+    for block in (block for block in blocks(page, *FILES) if block.name):
         path = folder / block.name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(block.text)
@@ -208,7 +209,7 @@ def shortened(words: list[str]) -> list[str]:
 def test_every_command_can_be_run(
     page: Path, readers_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    others = ("my_search", "my_swap", "HASH", "tcp:")
+    others = ("my_search", "my_swap", "my_swarm", "HASH", "tcp:")
     every = [words for words in commands(page) if not any(o in " ".join(words) for o in others)]
     if not every or page.name == "README.md":
         pytest.skip("no commands, or run as they stand, in an empty folder, by the next test")
@@ -239,7 +240,7 @@ def test_code_and_queries_run_as_they_stand(
         cells = [c for c in json.loads(page.read_text())["cells"] if c["cell_type"] == "code"]
         assert not any(cell["outputs"] for cell in cells)
         code = [Block("python", "", "".join(cell["source"])) for cell in cells]
-    elif not (code := blocks(page, "python", "sql")):
+    elif not (code := [block for block in blocks(page, "python", "sql") if not block.name]):
         pytest.skip("no code")
     with fresh_folder(tmp_path, monkeypatch):
         assert main(["run", "experiment=rana_planar", "budget=smoke", "--no-report"]) == 0

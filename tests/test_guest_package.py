@@ -6,6 +6,7 @@ Nothing is downloaded: the environment sees the packages of the one that runs th
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import sysconfig
@@ -16,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from test_documentation import blocks
 
 NAME = "lambda_search"
 OFFLINE = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
@@ -114,6 +117,24 @@ def test_its_own_tests_pass(execute: Execute, run: list[str]) -> None:
     printed = execute("pytest", "-q", "-p", "no:cacheprovider", folder=NAME)
     assert re.search(r"^\d+ passed", printed.splitlines()[-1])
     assert "skipped" not in printed
+
+
+def test_the_tutorial_of_a_paper_as_it_stands(work: Path, execute: Execute) -> None:
+    printed = ""
+    for block in blocks(Path(__file__).parents[1] / "docs/own_paper.md"):
+        if block.name:
+            assert (work / block.name).is_file(), "it takes the place of another one"
+            (work / block.name).write_text(block.text)
+            continue
+        for line in block.text.splitlines():
+            hashes = re.findall(r"[0-9a-f]{12}", printed)
+            words = shlex.split(line.replace("HASH", hashes[0] if hashes else ""), comments=True)
+            words[2:2] = ["--quiet", *OFFLINE] if words[0] == "pip" else []
+            said = execute(*words)
+            printed = said if words[:2] == ["evoexp", "run"] else printed
+            if "claims" in words:
+                assert "reproduced" in said and "not run" not in said
+            assert "reproduce" not in words or said.endswith("50 of 50 MATCH\n")
 
 
 def test_it_runs_from_a_wheel_and_is_missed_when_it_is_gone(

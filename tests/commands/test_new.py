@@ -143,6 +143,26 @@ def test_an_operator_enters_the_planners_of_the_papers(evoexp: Evoexp, tmp_path:
         assert guest.planner.ga.crossover.share == 0.5
 
 
+def test_a_paper_runs_is_judged_and_drawn(evoexp: Evoexp, tmp_path: Path) -> None:
+    """At the paper's budget: a guest's experiment is in no shipped table."""
+    assert exit_code("new", "paper", "swarms", "--directory", str(tmp_path)) == 0
+    package = tmp_path / "swarms"
+    for path in (path for path in package.rglob("*") if path.is_file()):
+        assert not re.search("my_p(lanner|aper)|MyP(lanner|aper)", f"{path}{path.read_text()}")
+    points = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
+    groups = {group.removeprefix("evoexp."): names for group, names in points.items()}
+    write_distribution(package / "src", "swarms", "0.1.0", **groups)
+    with on_path(package / "src"):
+        for word in ("experiment=swarms", "experiment=swarms_claims"):
+            assert evoexp("run", word).code == 0
+        rows = {row["name"]: row for row in json.loads(evoexp("claims", "swarms", "--json").out)}
+        assert rows["free"]["verdict"].startswith("depends on the reading (reproduced under 3 of 4")
+        assert rows["better_than_chance"]["verdict"] == "reproduced"
+        changed = evoexp("run", "experiment=swarms", "ga.num_generations=3")
+        page = Path(changed.out.split("report: ")[1].strip()).with_name("index.md").read_text()
+        assert page.count("not judged (settings overridden)") == 4
+
+
 WORD = "a word of lower-case letters, digits and _ that begins with a letter"
 USED = "a new name: a component or an option has this one"
 NAMES = dict.fromkeys(

@@ -55,20 +55,26 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
     """Yield the claims of a paper, experiment by experiment, with `KEYS`.
 
     A claim that is judged under every reading, by the experiment `<paper>_claims`, is yielded from
-    there alone, and a sentence once, from the first experiment that judges it. Where a condition
-    has no run, it names the command that runs its experiment.
+    there alone, and a sentence once, from the first experiment that judges it, which has all its
+    conditions. Where a condition has no run, it names the command that runs its experiment.
     """
     known = set[str]()
+    judged: dict[str, set[str]] = {}  # rule → identities of the conditions of its experiments
     experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
     of_readings = f"{paper}_claims"
     for experiment in sorted(experiments, key=lambda name: name != of_readings):
+        (expanded,) = compose.expand([f"experiment={experiment}"])
+        ids = {condition.id for _, condition in expanded.conditions}
         own = [
             rule.name
             for rule in rules.values()
             if experiment == of_readings or of_readings not in rule.experiments
+            if not ids <= judged.get(rule.name, set())
         ]
+        for name in own:
+            if experiment in rules[name].experiments:
+                judged.setdefault(name, set()).update(ids)
         try:
-            (expanded,) = compose.expand([f"experiment={experiment}"])
             request, settings, num_replicates = request_of(expanded, [])
             results = request.results(outputs_root(), num_replicates)
             if len(results.with_data) < len(results.conditions):

@@ -1,4 +1,4 @@
-"""`evoexp new`: the first files of a package with a planner or an operator of the user's own."""
+"""`evoexp new`: the first files of a package with a user's own planner, operator or paper."""
 
 import argparse
 import keyword
@@ -17,8 +17,11 @@ from evoexp.store.files import write_files
 # package and `My…` for the class
 COMMANDS = {
     "planner": "evoexp run experiment={name} budget=smoke",
+    "paper": "evoexp run experiment={name} budget=smoke",
     "operator": "evoexp run experiment=lavoie_7dof ga.crossover={name} budget=smoke",
 }
+# folders of a kind's files in the assets; a paper brings a planner, and files of its own after it
+TEMPLATES = {"planner": ("planner",), "paper": ("planner", "paper"), "operator": ("operator",)}
 GROUPS = ("experiment", "planner", "ga")  # that the package may add an option to
 
 
@@ -40,13 +43,16 @@ def main(arguments: argparse.Namespace) -> int:
         raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
     if find_spec(name) is not None:
         raise PackageExists(f"{name}: a module of this name is installed; choose another NAME")
-    kind = arguments.kind
-    template = Path(evoexp.__file__).parent / "assets" / f"new_{kind}"
-    files = {
-        root / _named(path, kind, name): _named((template / path).read_text("utf-8"), kind, name)
-        for path in sorted(str(each.relative_to(template)) for each in template.rglob("*.*"))
-        if "__pycache__" not in path and (template / path).is_file()
-    }
+    files: dict[Path, str] = {}
+    for kind in TEMPLATES[arguments.kind]:
+        template = Path(evoexp.__file__).parent / "assets" / f"new_{kind}"
+        files |= {
+            root / _named(path, kind, name): _named(
+                (template / path).read_text("utf-8"), kind, name
+            )
+            for path in sorted(str(each.relative_to(template)) for each in template.rglob("*.*"))
+            if "__pycache__" not in path and (template / path).is_file()
+        }
     try:
         for path in files:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -56,7 +62,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise
     print(f"{root}: {len(files)} files")
     print(f"install it: pip install -e {root}")
-    print(f"run it:     {COMMANDS[kind].format(name=name)}")
+    print(f"run it:     {COMMANDS[arguments.kind].format(name=name)}")
     return 0
 
 

@@ -224,6 +224,23 @@ def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
                 yield evolution(judge, own, controls)
 
 
+def tuned(results: Results) -> list[tuple[str, str]]:
+    """Return labels of the first map: of the best setting on the other maps, and its control's.
+
+    The best one has the least mean logarithm of the median cost.
+    """
+    first, *others = run_measures.grouped(results.with_data, lambda c: c.scenario)
+
+    def elsewhere(condition: ConditionResults) -> float:
+        planner = condition.condition.planner
+        twins = [c for own in others for c in own if c.condition.planner == planner]
+        return float(np.mean([np.log(np.median(c.column(COST))) for c in twins]))
+
+    sides = ([c for c in first if c.is_control == control] for control in (False, True))
+    best = [min(side, key=elsewhere).label for side in sides if side and others]
+    return [(best[0], best[1])] if len(best) == 2 else []
+
+
 def falls_steadily(condition: ConditionResults) -> np.ndarray:
     """Return whether each run's average cost falls from every fifth of it to the next, (done,)."""
     rows = condition.generations

@@ -6,12 +6,14 @@ import numpy as np
 import pandas as pd
 
 from evoexp.collision.certifier.coal_distances import CoalDistance
-from evoexp.objectives.posture_cost import UPRIGHT
+from evoexp.numeric.elementary import DEGREE
+from evoexp.objectives.posture_cost import AXIAL, UPRIGHT
 from evoexp.paths.motion import Motion
 from evoexp.planners.posture_es.phases import Problem
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import by_column
 from evoexp.report.statistics.inference import Proportion, quantile
 
@@ -195,6 +197,14 @@ def releases(condition: ConditionResults) -> list[tuple[float, float]]:
                 tilt = float(span.judged.rows[UPRIGHT, -1])
                 found.append((min(gaps, default=np.inf), tilt))
     return found
+
+
+def approaches_across(condition: ConditionResults, rules: Rules) -> BoolArray:
+    """Return whether each run's last posture is turned across the object's axis, (done,)."""
+    most = DEGREE * rules["axial_approach"].limits["degrees"]
+    own = condition.problem(Problem)
+    angles = [own.spans(q)[-1].judged.rows[AXIAL, -1] for q in paths(condition).values()]
+    return np.array(angles) <= most
 
 
 def robots(obstructed: Conditions) -> Conditions:

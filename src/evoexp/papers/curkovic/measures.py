@@ -96,6 +96,24 @@ def free_by_envelope(condition: ConditionResults) -> BoolArray:
     )
 
 
+def hit_when_stopped(condition: ConditionResults) -> BoolArray:
+    """Return whether a robot may be hit if it stops while the others go on, (done,).
+
+    Each robot of each run's motion stops at each of its configurations but the last.
+    """
+    planner, problem = condition.prepared
+    shape = len(problem.start), planner.num_configurations + 2, 2
+    stops = list(itertools.product(range(shape[0]), range(shape[1] - 1)))
+    found = []
+    for solution in condition.solutions.values():
+        teams = np.tile(solution.reshape(shape), (len(stops), 1, 1, 1))
+        for team, (robot, instant) in zip(teams, stops, strict=True):
+            team[robot, instant:] = team[robot, instant]
+        hits = (planner.evaluate(problem, team.ravel())["team_collisions"] for team in teams)
+        found.append(any(hit > 0.0 for hit in hits))
+    return np.array(found)
+
+
 tip_path = summed("term_tip_path_robot_")  # C2 [m], over the robots
 rotation = summed("term_rotation_robot_")  # C3 [rad]
 unevenness = summed("term_tip_unevenness_robot_")  # C4 [m]

@@ -16,9 +16,10 @@ from evoexp.papers.lavoie.measures import Percentage
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.figures.effort_curves import BEFORE, draw_steps
 from evoexp.report.pages import markdown
 from evoexp.report.results import motion_geometry
-from evoexp.report.results.run_measures import median_replicate, solved, touches
+from evoexp.report.results.run_measures import median_replicate, num_joints, solved, touches
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Proportion, spread
@@ -302,3 +303,31 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "starts": lambda conditions: [ShownMotion(c.label, c) for c in conditions],
     "solutions": lambda conditions: [_shown(c, solved(c)) for c in conditions if solved(c).any()],
 }
+
+
+def anytime_table(results: Results, effort: Values) -> pd.DataFrame:
+    """Return the share of runs that have a solution after so many evaluations, per condition."""
+    rows = []
+    conditions = [c for c in results.evolved if c.done]
+    begin = BEFORE * min(float(effort(c).min()) for c in conditions)
+    for c in conditions:
+        efforts = np.sort(effort(c)[np.isfinite(effort(c))])
+        steps = [(begin, 0), *((x, n + 1) for n, x in enumerate(efforts))]
+        steps.append((float(c.column("evaluations").max()), len(efforts)))
+        rows += [(num_joints(c), c.label, x, n / c.done, c.done) for x, n in steps]
+    return pd.DataFrame(rows, columns=["joints", "planner", "evaluations", "share", "runs"])
+
+
+def draw_anytime(table: pd.DataFrame) -> Figure:
+    """Draw the shares as steps, in a panel per arm; labels begin with the arm's name."""
+    arms = list(groups(table, "joints"))
+    figure, panels = style.panels(3.6, len(arms))
+    for axes, (joints, rows) in zip(panels, arms, strict=True):
+        labels = list(rows["planner"].unique())
+        names = {label: label.partition(", ")[2] or "as printed" for label in labels}
+        draw_steps(axes, rows, "evaluations", "share", labels, names if len(arms) > 1 else {})
+        axes.set(xlabel="evaluations", ylim=(0.0, 1.02))
+        axes.set_title(f"{joints} joints")
+    panels[0].set_ylabel("share of runs with a solution")
+    style.legend_below(figure, panels, 4)
+    return figure

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults
@@ -45,6 +45,44 @@ def shortened(condition: ConditionResults) -> Proportion:
     return counted(np.less(after, before))
 
 
+def crossed_jumps(condition: ConditionResults) -> Proportion:
+    """Count the paths that cross-over leaves with a jump, of pairs of fresh redistributed strings.
+
+    A child takes its path from another parent from a site on (section 3.4 b), as far as both are
+    close there. A jump is a step into the site of more than `UNEVEN` mean steps of the child.
+    """
+    problem = condition.problem(Problem)
+    strings = fresh(condition, redistributed=True)
+    num_points, rng = strings.shape[1], np.random.Generator(np.random.PCG64(0))
+    one, two = rng.permutation(FRESH).reshape(2, -1)
+    crossed, jumps = np.ones(len(one), dtype=bool), []
+    for first, stop in problem.arm_slices:
+        own = strings[first:stop]
+        site = rng.integers(1, num_points - 1, size=len(one))  # 1 … N − 1
+        gap = np.linalg.norm(own[:, site, one] - own[:, site, two], axis=0)
+        crossed &= gap < condition.planner.crossover_distance
+        from_mate = np.arange(num_points)[:, None] >= site
+        child = np.where(from_mate, own[:, :, two], own[:, :, one])
+        step = np.linalg.norm(np.diff(child, axis=1), axis=0)
+        jumps.append(step[site - 1, np.arange(len(site))] > UNEVEN * step.mean(axis=0))
+    return counted(np.array(jumps)[:, crossed].ravel())
+
+
+def falls(condition: ConditionResults, prefix: str) -> BoolArray:
+    """Return whether terms with a prefix, summed, fell in each run or are 0 at its end, (done,).
+
+    The best string of the last generation beside that of the first one.
+    """
+    found = []
+    for replicate, solution in condition.solutions.items():
+        first, last = (
+            sum(value for name, value in condition.evaluate(q).items() if name.startswith(prefix))
+            for q in (condition.first_solution(replicate), solution)
+        )
+        found.append(last < first or last == 0.0)
+    return np.array(found)
+
+
 def speed_variation(condition: ConditionResults) -> FloatArray:
     """Return how much joint speed varies along each run's best motion, (done,) [-].
 
@@ -70,6 +108,10 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "even_paths": lambda condition: counted(
         ~_unequal(condition, fresh(condition, redistributed=True), EVEN).ravel()
     ),
+    # runs in which a criterion of the best string fell, or is 0 at the end
+    "shorter": lambda condition: falls(condition, "length_arm_"),
+    "evener": lambda condition: falls(condition, "unevenness_arm_"),
+    "fewer_collisions": lambda condition: falls(condition, "collisions"),
     # motions whose bodies never come closer than the safety distance, exactly
     "with_margin": lambda condition: Proportion(
         condition.verdicts.with_margin, condition.verdicts.judged

@@ -56,7 +56,8 @@ class Request(NamedTuple):
     def results(self, outputs: Path, num_replicates: int | None) -> Results:
         """Read the stored results, see `gather`."""
         words = self.experiment, self.budget, self.hint
-        return gather(outputs, self.conditions, num_replicates, *words, self.options)
+        results = gather(outputs, self.conditions, num_replicates, *words, self.options)
+        return results._replace(as_written="+" not in self.report_name)
 
 
 class ReportFiles(NamedTuple):

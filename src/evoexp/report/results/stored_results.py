@@ -82,10 +82,9 @@ class ConditionResults:
         """Replicate → its best solution, flat."""
         return {k: read_solution(self.run.log_path(k)).values for k in self._finished}
 
-    @functools.cached_property
-    def first_solution(self) -> FloatArray:
-        """Best of the initial population of the best replicate."""
-        return read_log(self.run.log_path(self.best_replicate)).solutions[0].values
+    def first_solution(self, replicate: int) -> FloatArray:
+        """Return the best of the initial population of a replicate."""
+        return read_log(self.run.log_path(replicate)).solutions[0].values
 
     def array(self, name: str) -> NDArray[Any]:
         """Return an array attached to the log of the best replicate."""
@@ -212,6 +211,7 @@ class Results(NamedTuple):
     budget: str  # name of the budget; empty for runs given by their hashes
     conditions: tuple[ConditionResults, ...]  # in the order of the experiment
     outputs: Path = Path()  # root of the outputs that they were read from
+    as_written: bool = False  # whether the experiment was asked for without overrides
 
     @property
     def with_data(self) -> tuple[ConditionResults, ...]:

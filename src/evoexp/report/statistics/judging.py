@@ -228,7 +228,8 @@ def not_judged(results: Results) -> str:
         if (row.experiment, row.budget) == (results.experiment, "paper")
     }
     seed = option(config_directory() / "config.yaml")["seed"].value  # another one is as good as any
-    if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
+    changed = any(c.condition._replace(seed=seed).id not in own for c in results.conditions)
+    if changed if own else not results.as_written:  # a guest's experiment is in no table
         return "settings overridden"
     return ""
 

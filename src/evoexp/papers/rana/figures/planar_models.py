@@ -77,7 +77,7 @@ def draw_arms(table: pd.DataFrame) -> Figure:
 def via_points_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the via-points of the best replicate, at the beginning and at the end."""
     solutions = {
-        "best of the initial population": condition.first_solution,
+        "best of the initial population": condition.first_solution(condition.best_replicate),
         "best at the end": condition.solutions[condition.best_replicate],
     }
     return pd.concat(

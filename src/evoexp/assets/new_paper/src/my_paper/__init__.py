@@ -1,0 +1,1 @@
+"""my_paper: a paper for evoexp."""

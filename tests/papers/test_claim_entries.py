@@ -33,8 +33,9 @@ def judged(kind: str, **entry: Any) -> list[tuple[str, str]]:
     )
     rule = Rule("told", "{who} beside {others}", "", kind, "it holds", "", NUMBERS, ())
     judge = Judge("", page_settings("lavoie_coding"), {"told": rule})
-    scope = Scope(FUNCTIONS, {"judge": judge, "conditions": results.conditions})
-    return [(c.text, c.verdict) for c in judged_as_written(scope, {"claim": "told", **entry})]
+    values = {"judge": judge, "settings": judge.settings, "conditions": results.conditions}
+    scopes = [Scope(FUNCTIONS, values)]
+    return [(c.text, c.verdict) for c in judged_as_written(scopes, {"claim": "told", **entry})]
 
 
 CHEAP, DEAR = (label for label, _ in smoke_experiment("lavoie_coding").conditions[:2])
@@ -72,8 +73,10 @@ def test_entries_of_papers_name_conditions_that_their_experiments_have() -> None
         assert registration is not None
         rules = registered_rules(registration)
         pages = read_page_file(registration.target.partition(":")[0]).entries["pages"]
-        entries = [e for page in pages.values() for e in page.get("claims", ())]
-        for entry in (e for e in entries if isinstance(e, dict) and "claim" in e):
+        written = [e for page in pages.values() for e in page.get("claims", ())]
+        written += [e for own in written if isinstance(own, dict) for e in own.get("judge", ())]
+        entries = [e for e in written if isinstance(e, dict) and "claim" in e]
+        for entry in entries:
             than = entry.get("than", [])
             named = {entry.get("of", "{"), *([than] if isinstance(than, str) else than)}
             known = [labels[experiment] for experiment in rules[entry["claim"]].experiments]

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,7 @@ from evoexp.report.statistics.judging import (
     Judge,
     judge,
 )
+from report_samples import page_claims
 
 RULES = read_page_file("evoexp.papers.lavoie").rules
 SETTINGS = report_samples.page_settings("", "lavoie")
@@ -69,6 +71,12 @@ def changed(condition: ConditionResults, **columns: object) -> ConditionResults:
 
 def percentages(results: Results) -> list[Claim]:
     return list(claims.percentages(Judge("", SETTINGS, RULES), results.conditions))
+
+
+def named(name: str, results: Results, **functions: Callable[..., object]) -> list[Claim]:
+    none = Proportion(0, 1000)
+    found = page_claims("lavoie", results, **{"anywhere": lambda condition: none, **functions})
+    return [claim for claim in found if claim.name == name]
 
 
 @pytest.mark.parametrize(
@@ -135,40 +143,33 @@ def test_runs_need_no_start_if_they_fail_no_more_often_than_the_papers(
 
 def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
     results = two_arms(964, 999)
-    own = judge(results, SETTINGS, RULES)
-    below_1, below_2 = claims.more_joints_are_better(own, results.conditions)
+    below_1, below_2 = named("longer_arm", results)
     assert (below_1.verdict, below_2.verdict) == (REPRODUCED, EQUAL)
     assert "Fisher's exact p = 4.1e−10" in below_1.evidence
-    assert list(claims.more_joints_are_better(own, results.conditions[:1])) == []
+    alone = results._replace(conditions=results.conditions[:1])
+    assert named("longer_arm", alone) == []
 
 
 def test_motions_in_contact_contradict() -> None:
     results = two_arms(1000, 1000)
-    own, (seven, ten) = judge(results, SETTINGS, RULES), results.conditions
+    (seven, ten), touch = results.conditions, Proportion(115, 1000)
     certified = pd.array(np.arange(1000) >= 115, dtype="boolean")
-    found = claims.free_of_collision(own, changed(seven, certified=certified))
-    assert found.verdict == CONTRADICTED
+    results = results._replace(conditions=(changed(seven, certified=certified), ten))
+    found, other = named("free_of_collision", results, anywhere=lambda condition: touch)
+    assert (found.verdict, other.verdict) == (CONTRADICTED, REPRODUCED)
     assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
-    assert claims.free_of_collision(own, ten).verdict == REPRODUCED
 
 
 def sweep(results: Results, contacts: dict[str, int] | None = None) -> list[Claim]:
     """Return the claims of a sweep; some accepted runs of each condition, by label, in contact."""
 
-    def refuted(c: ConditionResults) -> RefutedMotions:
-        none = Proportion(0, c.solved)
-        return RefutedMotions(Proportion((contacts or {}).get(c.label, 0), c.solved), none, none)
+    def refuted(condition: ConditionResults) -> RefutedMotions:
+        solved, touching = condition.solved, (contacts or {}).get(condition.label, 0)
+        return RefutedMotions(Proportion(touching, solved), *[Proportion(0, solved)] * 2)
 
-    own = judge(results, SETTINGS, RULES)
-    return [
-        *claims.either_success(own, results),
-        *claims.precision(own, results),
-        *claims.generations(own, results),
-        *claims.coding(own, results),
-        *claims.blindness(own, results, refuted),
-        *claims.judge_controls(own, results),
-        *claims.positions(own, results, refuted),
-    ]
+    others = ("pseudoinverse", "between_points")  # entries of their own
+    found = page_claims("lavoie_sweep", results, refuted=refuted)
+    return [c for c in found if not any(name in c.name for name in others)]
 
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:

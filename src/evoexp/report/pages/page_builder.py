@@ -74,7 +74,7 @@ def build(
         other = entry.get("otherwise", GENERIC)
         return build(own_pages() if other == GENERIC else file, other, results, settings)
     if "headlines" not in entry:
-        return PageBuilder(file, scope.inner(compared=_compared(scope, entry))).page(entry)
+        return PageBuilder(file, scope.inner(compared=family_comparisons(scope, entry))).page(entry)
     return own_page(
         "readings",
         results,
@@ -122,10 +122,14 @@ class PageBuilder:
         """Yield claims, judged one after the other, or several of each item."""
         for entry in entries:
             each: Entry = {"judge": [entry]} if isinstance(entry, str) else entry
+            if "claim" in each:
+                yield from judged_as_written(self.items(each), each)
+                continue
             for scope in self.items(each):
-                if "claim" in each:
-                    yield from judged_as_written(scope, each)
-                for name in each.get("judge", ()):
+                for name in each["judge"]:
+                    if isinstance(name, Mapping):
+                        yield from judged_as_written(self.items(name, scope), name)
+                        continue
                     judged = scope[name]
                     yield from [judged] if isinstance(judged, Claim) else judged or ()
 
@@ -190,7 +194,7 @@ class PageBuilder:
                 for name, value in zip(names, item if len(names) > 1 else (item,), strict=True):
                     inner = inner.inner(**{name: value})
                 scopes.append(inner)
-        return (each for each in scopes if "when" not in entry or each.holds(entry["when"]))
+        return (each for each in scopes if _is_shown(each, entry))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""
@@ -257,6 +261,10 @@ class PageBuilder:
         )
 
 
+def _is_shown(scope: Scope, entry: Entry) -> bool:
+    return "when" not in entry or scope.holds(entry["when"])
+
+
 def _argument(scope: Scope, value: Any) -> Any:
     """Return an argument: the value of a name, functions by their texts, or a number itself."""
     if isinstance(value, Mapping):
@@ -271,7 +279,7 @@ def measure(
     return Measure(scope.text(name), scope[values], unit, better == "lower")
 
 
-def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
+def family_comparisons(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
     """Return the comparisons of families that a page asks for, which functions name `compared`."""
     found: list[FamilyComparison] = []
     for entry in page.get("comparisons", ()):
@@ -286,9 +294,10 @@ def _headline(scope: Scope, entry: Entry) -> Headline:
     """Return a headline claim of a paper, which a function judges on one condition."""
 
     def judged(condition: Any, controls: Any) -> Claim | None:
-        function = scope.functions[entry["judge"]]
-        return cast(
-            "Claim | None", scope.inner(condition=condition, controls=controls).call(function)
-        )
+        inner, judge = scope.inner(condition=condition, controls=controls), entry["judge"]
+        if isinstance(judge, Mapping):
+            shown = [inner] if _is_shown(inner, judge) else []
+            return next(judged_as_written(shown, {"claim": entry["claim"], **judge}), None)
+        return cast("Claim | None", inner.call(scope.functions[judge]))
 
     return Headline(entry["claim"], scope.text(entry["quantity"]), scope[entry["values"]], judged)

@@ -60,7 +60,6 @@ def judged_as_written(scopes: Iterable[Scope], entry: Mapping[str, Any]) -> Iter
 
 def _items(scope: Scope, entry: Mapping[str, Any]) -> Iterator[_Item]:
     """Yield the item of a scope, if its conditions are there."""
-    judge: Judge = scope["judge"]
     by_label = {c.label: c for c in scope["conditions"]}
     than = entry.get("than", [])
     labels = [entry["of"]] if "of" in entry else ["{condition.label}"] * ("condition" in scope)
@@ -73,13 +72,20 @@ def _items(scope: Scope, entry: Mapping[str, Any]) -> Iterator[_Item]:
     words = {"who": "".join(labels[:1]), "others": ", ".join(labels[1:])}
     words |= {name: item_scope.text(text) for name, text in entry.get("words", {}).items()}
     values = scope.function(entry["values"]) if "values" in entry else None
-    yield _Item(item_scope, judge.on(entry["claim"], **words), words, known, values)
+    judge: Judge = item_scope[entry.get("by", "judge")]
+    hearing = judge.on(entry["claim"], **words)
+    rule = hearing.rule._replace(evidence=entry.get("evidence", hearing.rule.evidence))
+    yield _Item(item_scope, hearing._replace(rule=rule), words, known, values)
 
 
 def _claims(items: Sequence[_Item], entry: Mapping[str, Any]) -> Iterator[Claim]:
     """Judge the items of a family."""
     kind = items[0].hearing.rule.kind if items else ""
-    if entry.get("elsewhere"):
+    if "unjudged" in entry:
+        verdict = f"{judging.NOT_JUDGED} ({entry['unjudged']})"
+        for item in items:
+            yield item.hearing.made(item.told(""), item.scope["condition"].done, verdict)
+    elif entry.get("elsewhere"):
         for item in items:
             yield item.hearing.elsewhere(ELSEWHERE.format(item.hearing.rule.experiments[0]))
     elif kind in ("better", "better than all"):

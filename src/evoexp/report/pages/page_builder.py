@@ -118,20 +118,17 @@ class PageBuilder:
                     unit = self.scope["unit"] if unit == LENGTH else unit
                     yield quantity(results, self.scope.text(title), unit, self.scope[values])
 
-    def claims(self, entries: Sequence[str | Entry]) -> Iterator[Claim]:
+    def claims(self, entries: Sequence[str | Entry], scope: Scope | None = None) -> Iterator[Claim]:
         """Yield claims, judged one after the other, or several of each item."""
         for entry in entries:
-            each: Entry = {"judge": [entry]} if isinstance(entry, str) else entry
-            if "claim" in each:
-                yield from judged_as_written(self.items(each), each)
-                continue
-            for scope in self.items(each):
-                for name in each["judge"]:
-                    if isinstance(name, Mapping):
-                        yield from judged_as_written(self.items(name, scope), name)
-                        continue
-                    judged = scope[name]
-                    yield from [judged] if isinstance(judged, Claim) else judged or ()
+            if isinstance(entry, str):
+                judged = (self.scope if scope is None else scope)[entry]
+                yield from [judged] if isinstance(judged, Claim) else judged or ()
+            elif "claim" in entry:
+                yield from judged_as_written(self.items(entry, scope), entry)
+            else:
+                for inner in self.items(entry, scope):
+                    yield from self.claims(entry["judge"], inner)
 
     def tables(self, names: Sequence[str]) -> Iterator[Table]:
         """Yield the tables that have rows."""

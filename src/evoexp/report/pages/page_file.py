@@ -23,13 +23,13 @@ from evoexp.report.statistics.claim_rules import NO_RULES, Rules, read_rules
 FIGURES = "evoexp.report.figures"  # those that papers share
 FILE, RULES_FILE = "page.yaml", "claims.yaml"
 _CLAIM = {"each", "when", "claim", "of", "than", "values", "better", "word", "words", "family"}
-_CLAIM |= {"elsewhere", "n", "planned"}
+_CLAIM |= {"elsewhere", "unjudged", "n", "planned", "by", "evidence"}
 KEYS: dict[str, set[str]] = {
     "file": {"name", "functions", "pages", "quantities", "tables", "checks", "figures"},
     "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
     | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
     "claims": _CLAIM | {"judge"},
-    "judge": _CLAIM,
+    "judge": _CLAIM | {"judge"},
     "comparisons": {"families", "measures", "controls"},
     "headlines": {"claim", "quantity", "values", "judge"},
     "tables": {"heading", "headers", "behind", "each", "when", "cells", "row", "rows"} | {"note"},
@@ -43,7 +43,7 @@ _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
 _FIRST = re.compile(r"[.\[]")  # ends the first part of a name
 _NAMED = (
     *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
-    *("plays", "shows", "n", "planned"),
+    *("plays", "shows", "n", "planned", "by"),
 )
 _TEXTS = ("title", "introduction", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (

@@ -88,7 +88,7 @@ def _claims(items: Sequence[_Item], entry: Mapping[str, Any]) -> Iterator[Claim]
     elif entry.get("elsewhere"):
         for item in items:
             yield item.hearing.elsewhere(ELSEWHERE.format(item.hearing.rule.experiments[0]))
-    elif kind in ("better", "better than all"):
+    elif kind in ("better", "better than all", "best"):
         settings = items[0].scope["settings"]
         lower = entry.get("better") != HIGHER
         rows = [
@@ -116,18 +116,45 @@ def _claims(items: Sequence[_Item], entry: Mapping[str, Any]) -> Iterator[Claim]
 
 def _better(item: _Item, rows: Sequence[Comparison], entry: Mapping[str, Any]) -> Claim:
     word = str(entry.get("word", entry.get("better", "lower")))
-    medians = [markdown.number(float(np.median(item.values(c)))) for c in item.conditions]
-    told = f"median {' against '.join(medians)}"
-    labelled = zip((c.label for c in item.conditions), medians, strict=True)
-    words = {"medians": ", ".join(map(" ".join, labelled))}
-    if item.hearing.rule.kind == "better":
-        row = next(iter(rows), None)
-        comparison = judging.evidence(row, word) if row else "nothing to compare"
-        told = item.told(f"{told}; {comparison}", comparison=comparison, **words)
-        return item.hearing.better(row, word, told)
-    comparison = "; ".join(f"{row.quantity}: {judging.evidence(row, word)}" for row in rows)
-    told = item.told("; ".join(filter(None, (told, comparison))), comparison=comparison, **words)
-    return item.hearing.better_than_all(told, rows)
+    found = [float(np.median(item.values(c))) for c in item.conditions]
+    medians, labels = [*map(markdown.number, found)], [c.label for c in item.conditions]
+    effects = [judging.evidence(row, word) for row in rows] or ["nothing to compare"]
+    beside = [f"{row.quantity}: {own}" for row, own in zip(rows, effects, strict=False)]
+    usual = effects if item.hearing.rule.kind == "better" else beside
+    told = item.told(
+        "; ".join([f"median {' against '.join(medians)}", *usual]),
+        comparison=effects[0],
+        comparisons="; ".join(beside),
+        medians=", ".join(map(" ".join, zip(labels, medians, strict=True))),
+        median=medians[0],
+        best_other=": ".join(min(zip(found[1:], labels[1:], medians[1:], strict=True))[1:]),
+        outcomes=_outcomes(labels[0], rows, item.hearing.significance),
+    )
+    match item.hearing.rule.kind:
+        case "better":
+            return item.hearing.better(next(iter(rows), None), word, told)
+        case "best":
+            return item.hearing.best(told, rows, found[0] <= min(found[1:]))
+        case _:
+            return item.hearing.better_than_all(told, rows)
+
+
+def _outcomes(label: str, rows: Sequence[Comparison], significance: float) -> str:
+    """List the conditions that the first is better than, worse than, or not told from."""
+    words = {
+        1: "is significantly better than",
+        -1: "is significantly worse than",
+        0: "cannot be told from",
+    }
+    parts = []
+    for sign, word in words.items():
+        named = [
+            f"{row.quantity} (A12 {row.better.a12:.2f}, p = {markdown.p_value(row.p_adjusted)})"
+            for row in rows
+            if row.says(significance) == sign
+        ]
+        parts += [f"{word} {', '.join(named)}"] * bool(named)
+    return f"{label} {'; '.join(parts)}"
 
 
 def _alone(item: _Item, entry: Mapping[str, Any]) -> Claim:

@@ -123,6 +123,7 @@ def _better(item: _Item, rows: Sequence[Comparison], entry: Mapping[str, Any]) -
     usual = effects if item.hearing.rule.kind == "better" else beside
     told = item.told(
         "; ".join([f"median {' against '.join(medians)}", *usual]),
+        against=" against ".join(medians),
         comparison=effects[0],
         comparisons="; ".join(beside),
         medians=", ".join(map(" ".join, zip(labels, medians, strict=True))),

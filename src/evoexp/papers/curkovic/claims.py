@@ -2,17 +2,15 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import Any
 
 from evoexp.papers.curkovic import measures
 from evoexp.planners.coevolution.planner import Problem
-from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim, Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, by_column, compared
+from evoexp.report.statistics.comparisons import Comparison, compared
 from evoexp.report.statistics.inference import Proportion
 from evoexp.report.statistics.judging import Judge
 
@@ -22,29 +20,6 @@ PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))  # with a hal
 TWINS = dict(PAIRS)
 METHOD, ELITES = "V", "15 elites"
 KEPT = "least distance of an end-effector from another robot's links"
-
-
-def matched_pairs(results: Results, settings: ReportSettings, threshold: float) -> list[Rows]:
-    """Compare methods with their twins: by cost, generations, and cost with refuted ones worst."""
-    by_label = {c.label: c for c in results.with_data}
-    pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
-    matched = partial(
-        compared, pairs, settings=settings, named=lambda a, b: f"{a.label} against {b.label}"
-    )
-    generations = partial(measures.generations_to, threshold=threshold)
-    values = by_column("best_cost"), generations, measures.certified_cost
-    return list(map(matched, values))
-
-
-def method_comparisons(matched_pairs: list[Rows], threshold: float) -> list[tuple[str, Rows]]:
-    """Return (heading, comparisons) of matched pairs."""
-    to = markdown.number(threshold)
-    titles = "best cost of a team", f"generations to a team below {to}", measures.CERTIFIED
-    return [
-        (f"{title}: matched pairs of methods", rows)
-        for title, rows in zip(titles, matched_pairs, strict=True)
-        if rows
-    ]
 
 
 def radius_conditions(results: Results) -> tuple[ConditionResults, ...]:

@@ -27,6 +27,7 @@ from evoexp.report.statistics.comparisons import (
     FamilyComparison,
     Measure,
     compare_families,
+    compared,
     compared_with_controls,
     headed,
 )
@@ -168,14 +169,22 @@ class PageBuilder:
 
     def comparisons(self, entry: Entry) -> Iterator[tuple[str, tuple[Comparison, ...]]]:
         """Yield (heading, comparisons)."""
+        results, settings = self.scope["results"], self.scope["settings"]
         for each in entry.get("comparisons", ()):
             if isinstance(each, str):
                 yield from self.scope[each]
             elif "controls" in each:
                 own = [measure(self.scope, *row) for row in each["controls"]]
-                yield from compared_with_controls(
-                    self.scope["results"], self.scope["settings"], own
-                )
+                yield from compared_with_controls(results, settings, own)
+            elif "pairs" in each:
+                by_label = {c.label: c for c in results.with_data}
+                known = [pair for pair in self.scope[each["pairs"]] if by_label.keys() >= {*pair}]
+                pairs = [(by_label[one], by_label[two]) for one, two in known]
+                for row in each["measures"] if pairs else ():
+                    of = measure(self.scope, *row)
+                    lower, named = of.lower_is_better, "{0.label} against {1.label}".format
+                    rows = compared(pairs, of.values, settings, lower_is_better=lower, named=named)
+                    yield f"{of.name}: {each['heading']}", rows
         yield from headed(self.scope["compared"])
 
     def items(self, entry: Entry, scope: Scope | None = None) -> Iterator[Scope]:

@@ -30,7 +30,7 @@ KEYS: dict[str, set[str]] = {
     | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
     "claims": _CLAIM | {"judge"},
     "judge": _CLAIM | {"judge"},
-    "comparisons": {"families", "measures", "controls"},
+    "comparisons": {"families", "measures", "controls", "pairs", "heading"},
     "headlines": {"claim", "quantity", "values", "judge"},
     "tables": {"heading", "headers", "behind", "each", "when", "cells", "row", "rows"} | {"note"},
     "checks": {"title", "finding", "each", "when", "rows"},
@@ -43,7 +43,7 @@ _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
 _FIRST = re.compile(r"[.\[]")  # ends the first part of a name
 _NAMED = (
     *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
-    *("plays", "shows", "n", "planned", "by"),
+    *("plays", "shows", "n", "planned", "by", "pairs"),
 )
 _TEXTS = ("title", "introduction", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (

@@ -232,9 +232,9 @@ def converges(condition: ConditionResults, converging: Proportion) -> bool | Non
 def different_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
     """Judge that the best paths known of the three weightings differ."""
     if len(groups) == 3 and all(group.truth is not None for group in groups):
-        paths = {tuple(map(tuple, group.best_path[0].tolist())) for group in groups}
-        told = f"{len(paths)} different best paths known of {len(groups)} weightings"
-        yield judge.on("different_paths").own(told, len(groups), len(paths) == len(groups))
+        paths = len({tuple(map(tuple, group.best_path[0].tolist())) for group in groups})
+        told = {"paths": paths, "weightings": len(groups)}
+        yield judge.on("different_paths").own(told, len(groups), paths == len(groups))
 
 
 def known_excess(truth: ConditionResults | None, shortest_known: float) -> str:

@@ -178,21 +178,16 @@ def _larger(judge: Judge, metric: str, compared: list[SizeComparison]) -> Iterat
     says: dict[str, list[int]] = {}
     for row in rows:
         says.setdefault(row.task, []).append(row.says)
-    told = (
-        f"expected {metric} over those of 100 individuals, λ in brackets: less for "
-        f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)}"
-    )
+    told = {"metric": metric, "less": _ratios(rows, -1), "more": _ratios(rows, 1)}
     seen = {row.says for row in rows}
     hearing = judge.on("larger_no_faster", metric=metric)
     yield hearing.own(told, f"{len(rows)} ratios", _unless(-1 in seen, 1 in seen))
     never = [name for name, own in says.items() if min(own) >= 0]
     slower = [name for name in never if max(says[name]) > 0]
-    told = (
-        f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
-        f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them"
-    )
     hearing = judge.on("larger_not_necessarily_faster", metric=metric)
-    yield hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
+    words: dict[str, object] = {"tasks": len(says), "never": len(never), "slower": len(slower)}
+    words |= {"names": ", ".join(never) or "–"}
+    yield hearing.own(words, f"{len(says)} tasks", _unless(not never, slower))
 
 
 def _over_proportional(
@@ -202,10 +197,8 @@ def _over_proportional(
     rows = [row for row in compared if row.value < RECOMMENDED]
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
-    told = (
-        f"above: {_ratios(rows, 1)}; below: {_ratios(rows, -1)}; not certain: {says.count(0)} of "
-        f"{len(rows)}"
-    )
+    told: dict[str, object] = {"above": _ratios(rows, 1), "below": _ratios(rows, -1)}
+    told |= {"uncertain": says.count(0), "count": len(rows)}
     hearing = judge.on("smaller_over_proportional", metric=metric, how=how, exceeds=exceeds)
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
@@ -224,10 +217,7 @@ def _converges_less(judge: Judge, how: str, sizes: list[SizePair]) -> Claim:
         if said
     )
     less, more = says.count(1), says.count(-1)
-    told = (
-        f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
-        f"often in {more}: {texts or '–'}"
-    )
+    told = {"less": less, "more": more, "pairs": len(pairs), "texts": texts or "–"}
     hearing = judge.on("smaller_converge_less", how=how)
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 

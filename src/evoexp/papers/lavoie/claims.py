@@ -29,24 +29,17 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Cl
     pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
     shares = [(measures.below(c, printed.bound), printed.proportion) for c, printed in pairs]
     p_values = inference.fisher_family(shares)
-    # Bonferroni: all intervals together have the level
-    level, each = (
-        judge.level,
-        1.0 - (1.0 - judge.level) / max(1, len(pairs)),
-    )
+    each = 1.0 - (1.0 - judge.level) / max(1, len(pairs))  # Bonferroni: of all intervals together
     claims = []
     for (c, printed), (own, theirs), p_adjusted in zip(pairs, shares, p_values, strict=True):
-        within, their_own = own.interval(level), theirs.interval(level)
+        within, (low, high) = own.interval(judge.level), theirs.interval(judge.level)
         place = "within" if within.low <= theirs.share <= within.high else "outside"
-        evidence = (
-            f"{judge.share(own, 1)}; the printed share lies {place}, its own thousand runs give "
-            f"[{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; "
-            f"{_difference(own, theirs, each)}, {100 * level:g} % over the {len(pairs)} together; "
-            f"Fisher's exact p, adjusted by Holm over {len(pairs)}, {markdown.p_value(p_adjusted)}"
-        )
+        told = {"own": own, "place": place, "low": 100 * low, "high": 100 * high, "p": p_adjusted}
+        told |= {"difference": _difference(own, theirs, each), "count": len(pairs)}
         words = {"bound": f"{printed.bound:g}", "share": f"{100 * theirs.share:.1f}"}
         hearing = judge.on("share_below", who=c.label, **words)
-        claims.append(hearing.same_share(evidence, own, theirs, p_adjusted))
+        told |= {"confidence": judge.level, "level": 100 * judge.level}
+        claims.append(hearing.same_share(told, own, theirs, p_adjusted))
     return claims
 
 
@@ -87,11 +80,9 @@ def no_start_needed(judge: Judge, condition: ConditionResults) -> Claim | None:
     low, high = inference.newcombe(own, theirs, judge.level)
     margin = -0.01 * hearing.rule.limits["margin"]
     holds = None if low <= margin <= high else low > margin
-    evidence = (
-        f"runs with a solution: {judge.share(own, 1)}; the paper's own, errors below "
-        f"{printed[0].bound:g}: {judge.share(theirs, 1)}; {_difference(own, theirs, judge.level)}"
-    )
-    return hearing.own(evidence, f"{own.total} and {theirs.total}", holds)
+    told = {"own": own, "bound": printed[0].bound, "theirs": theirs, "confidence": judge.level}
+    told |= {"difference": _difference(own, theirs, judge.level)}
+    return hearing.own(told, f"{own.total} and {theirs.total}", holds)
 
 
 def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
@@ -152,16 +143,11 @@ def more_solutions(
     """Judge that the algorithm finds more solutions than a control."""
     one, two = run_measures.success(own), run_measures.success(control)
     low, high = inference.newcombe(one, two, judge.level)
-    within = judge.share(solved_within(own, control), 1)
-    evidence = (
-        f"runs with a solution: {judge.share(one, 1)} against {judge.share(two, 1)} "
-        f"({control.label}), adjusted p = {markdown.p_value(p_adjusted)} (Fisher, Holm over the "
-        f"arms); the algorithm adds {100 * (one.share - two.share):.0f} "
-        f"[{100 * low:.0f}, {100 * high:.0f}] points; within the algorithm's median effort the "
-        f"control has solved {within}"
-    )
+    told = {"one": one, "two": two, "control": control.label, "p": p_adjusted}
+    told |= {"points": 100 * (one.share - two.share), "low": 100 * low, "high": 100 * high}
+    told |= {"within": solved_within(own, control), "confidence": judge.level}
     hearing = judge.on("more_solutions", who=f"{own.label}: ", control=f", {control.label}")
-    return hearing.greater(evidence, one, two, p_adjusted)
+    return hearing.greater(told, one, two, p_adjusted)
 
 
 def solved_within(own: ConditionResults, control: ConditionResults) -> Proportion:

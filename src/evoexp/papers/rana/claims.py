@@ -86,12 +86,11 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
         other = counts[part.label]
         says = [by[part.label].says(level) for by in rows.values() if part.label in by]
         says.append(judging.greater(other, own, p_value, level))
-        told = (
-            f"{_told(rows[COST].get(part.label), COST, '–')}; "
-            f"{_told(rows[EVENNESS].get(part.label), EVENNESS, 'deg', (printed, part))}; "
-            f"refuted motions {markdown.share(own.having, own.total)} with, "
-            f"{markdown.share(other.having, other.total)} without, p = {markdown.p_value(p_value)}"
-        )
+        told: dict[str, object] = {
+            "cost": _told(rows[COST].get(part.label), COST, "–"),
+            "evenness": _told(rows[EVENNESS].get(part.label), EVENNESS, "deg", (printed, part)),
+        }
+        told |= {"own": own, "other": other, "p": p_value}
         hearing = judge.on("operators_improve", who=who, without=part.label)
         claims.append(hearing.own(told, printed.done, improves(says)))
     return claims

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -73,12 +72,6 @@ def percentages(results: Results) -> list[Claim]:
     return list(claims.percentages(Judge("", SETTINGS, RULES), results.conditions))
 
 
-def named(name: str, results: Results, **functions: Callable[..., object]) -> list[Claim]:
-    none = Proportion(0, 1000)
-    found = page_claims("lavoie", results, **{"anywhere": lambda condition: none, **functions})
-    return [claim for claim in found if claim.name == name]
-
-
 @pytest.mark.parametrize(
     ("count", "runs", "other", "verdict"),
     [
@@ -139,25 +132,6 @@ def test_runs_need_no_start_if_they_fail_no_more_often_than_the_papers(
     assert found is not None and found.verdict == verdict
     assert f"{1000 - failures} of 1000" in found.evidence
     assert "lies above −1 point; contradicted if it lies below −1 point" in found.rule
-
-
-def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
-    results = two_arms(964, 999)
-    below_1, below_2 = named("longer_arm", results)
-    assert (below_1.verdict, below_2.verdict) == (REPRODUCED, EQUAL)
-    assert "Fisher's exact p = 4.1e−10" in below_1.evidence
-    alone = results._replace(conditions=results.conditions[:1])
-    assert named("longer_arm", alone) == []
-
-
-def test_motions_in_contact_contradict() -> None:
-    results = two_arms(1000, 1000)
-    (seven, ten), touch = results.conditions, Proportion(115, 1000)
-    certified = pd.array(np.arange(1000) >= 115, dtype="boolean")
-    results = results._replace(conditions=(changed(seven, certified=certified), ten))
-    found, other = named("free_of_collision", results, anywhere=lambda condition: touch)
-    assert (found.verdict, other.verdict) == (CONTRADICTED, REPRODUCED)
-    assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
 
 
 def sweep(results: Results, contacts: dict[str, int] | None = None) -> list[Claim]:

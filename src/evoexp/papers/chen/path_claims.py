@@ -78,12 +78,6 @@ def groups(results: Results) -> tuple[Group, ...]:
     return tuple(found)
 
 
-def shortest(groups: tuple[Group, ...]) -> float:
-    """Return the length of the shortest path [cell]; NaN without a reference."""
-    known = (shortest_known(g.truth) for g in groups if g.truth is not None)
-    return min(known, default=np.nan)
-
-
 def truth(results: Results, condition: ConditionResults) -> ConditionResults | None:
     """Return the reference of the same map, potentials and weights, if it is there."""
     return next((c for c in results.references if _problem(c) == _problem(condition)), None)
@@ -286,7 +280,6 @@ def control_name(condition: ConditionResults) -> str:
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
-    "shortest_of_all": lambda groups: [shortest(groups)],
     "near_shortest": lambda excess, rules: (
         excess <= rules["nearly_shortest"].limits["near_percent"]
     ),

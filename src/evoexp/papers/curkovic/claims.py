@@ -162,10 +162,10 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         else Proportion(0, solved_of_all.total)
     ),
     "planned_of_all": lambda results: sum(c.planned for c in results.conditions),
-    # under other numbers: the method, its twin without a hall, and both twins' labels
-    "method": _method,
-    "plain": lambda method: TWINS[method],
-    "is_printed_method": lambda method: method == METHOD,
+    # under other numbers: the method, that without a hall, and the labels of both twins
+    "treatment": _method,
+    "plain": lambda treatment: TWINS[treatment],
+    "is_printed_method": lambda treatment: treatment == METHOD,
     "plain_twin": lambda results, condition, plain: _twin(results, condition, plain),
     "elites_twin": lambda results, condition: _twin(results, condition, ELITES),
     # evaluations to a team of the threshold's cost in the condition's own scene, (done,)

@@ -94,10 +94,13 @@ def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
     beside = []  # (algorithm, uniform draws and itself without crossover)
     for own in results.main:
         if not _breeds_alone(own):
-            scene = (own.robot, own.scenario, own.planner)
-            drawn = [c for c in results.with_data if (c.robot, c.scenario, c.planner) == scene]
-            bred = [c for group in groups_but_for(results, "ga") if own in group for c in group]
-            controls = [c for c in drawn if c.is_control] + [*filter(_breeds_alone, bred)]
+            controls = [
+                c
+                for c in results.with_data
+                if (c.is_control or _breeds_alone(c))
+                and (c.robot, c.scenario) == (own.robot, own.scenario)
+                and c.planner.model_copy(update={"ga": own.planner.ga}) == own.planner
+            ]
             beside += [(own, controls)] if controls else []
     pairs = [(own, best_control(controls)) for own, controls in beside]
     shares = [(run_measures.success(own), run_measures.success(control)) for own, control in pairs]
@@ -159,36 +162,16 @@ def solved_within(own: ConditionResults, control: ConditionResults) -> Proportio
     return run_measures.counted(run_measures.solved(control) & (measures.effort(control) <= most))
 
 
-def groups_but_for(results: Results, *path: str) -> list[Group]:
-    """Return groups of conditions, without controls, that agree in all settings but one.
-
-    The names of the path lead to it: "ga", "num_generations".
-    """
-
-    def key(condition: ConditionResults) -> tuple[Any, ...]:
-        part = planner = condition.planner.canonical()
-        for name in path[:-1]:
-            part[name] = part = dict(part[name])
-        part.pop(path[-1], None)
-        scene = condition.robot, condition.scenario
-        return *(one.canonical() for one in scene), planner
-
-    return [group for group in run_measures.grouped(results.main, key) if len(group) > 1]
-
-
-def either_success(judge: Judge, results: Results) -> list[Claim]:
+def either_success(judge: Judge, main: Group) -> Iterator[Claim]:
     """Judge the printed percentages by either reading of a success, each a family of tests."""
-    by_reading: dict[str, list[ConditionResults]] = {}
-    for condition in itertools.chain(*groups_but_for(results, "success")):
-        by_reading.setdefault(condition.planner.success, []).append(condition)
-    families = (percentages(judge, own) for own in by_reading.values())
-    return list(itertools.chain(*families))
+    for reading in (", below its value", ", any finite cost"):
+        yield from percentages(judge, [c for c in main if c.label.endswith(reading)])
 
 
 def precision(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge that smaller stopping values give smaller errors, step by step."""
-    for group in groups_but_for(results, "stop_cost_sp2"):
-        own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
+    stopped = [c for c in results.main if c.label.startswith("stop below ")]
+    for own in run_measures.grouped(stopped, lambda c: c.planner.ga.num_generations):
         steps = [(small, large) for large, small in itertools.pairwise(own)]
         rows = compared(steps, measures.errors, judge.settings, named=_against)
         medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)

@@ -64,22 +64,6 @@ def enveloped(condition: ConditionResults) -> bool:
     return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
 
 
-def motion_checks(results: Results) -> tuple[tuple[str, str], ...]:
-    """Return the rows on bodies that stick out, and on the length of the chromosome."""
-    first = results.with_data[0]
-    checks = []
-    if enveloped(first):
-        models = {c.label: c.planner.collision for c in results.with_data}
-        sticks = [name for name, model in models.items() if model.tcp_radius < model.half_width]
-        title = (
-            "Boundary lines have no ends: the body of a link, round at its end, sticks out where "
-            "the tool is smaller"
-        )
-        checks.append((title, "; ".join(sticks) or "nowhere"))
-    notes = first.planner.notes(first.prepared.problem)
-    return (*checks, *(("Length of the chromosome (Eqs. 2, 3)", note) for note in notes))
-
-
 def crossing(main: Conditions) -> Conditions:
     """Return the first condition if it is one of two moving robots of lines; empty otherwise."""
     first = main[0]
@@ -146,6 +130,17 @@ def other_scene(condition: ConditionResults) -> tuple[str, str]:
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "pairs": lambda: PAIRS,
     "has_hall": lambda condition: condition.label in TWINS,
+    # bodies that stick out of boundary lines, and the length of the chromosome
+    "is_enveloped": lambda first: enveloped(first),
+    "sticking_out": lambda conditions: (
+        "; ".join(
+            c.label
+            for c in conditions
+            if c.planner.collision.tcp_radius < c.planner.collision.half_width
+        )
+        or "nowhere"
+    ),
+    "chromosome_notes": lambda first: first.planner.notes(first.prepared.problem),
     "instants": lambda: measures.INSTANTS,
     "crosses": lambda other_scene: not other_scene[0],
     # motions that are free, of those that the exact verdict decides

@@ -120,6 +120,7 @@ def _better(item: _Item, rows: Sequence[Comparison], entry: Mapping[str, Any]) -
     medians, labels = [*map(markdown.number, found)], [c.label for c in item.conditions]
     effects = [judging.evidence(row, word) for row in rows] or ["nothing to compare"]
     beside = [f"{row.quantity}: {own}" for row, own in zip(rows, effects, strict=False)]
+    best = min(range(len(found)), key=lambda k: (k == 0, found[k]))  # of the others, if any
     usual = effects if item.hearing.rule.kind == "better" else beside
     told = item.told(
         "; ".join([f"median {' against '.join(medians)}", *usual]),
@@ -128,7 +129,7 @@ def _better(item: _Item, rows: Sequence[Comparison], entry: Mapping[str, Any]) -
         comparisons="; ".join(beside),
         medians=", ".join(map(" ".join, zip(labels, medians, strict=True))),
         median=medians[0],
-        best_other=": ".join(min(zip(found[1:], labels[1:], medians[1:], strict=True))[1:]),
+        best_other=f"{labels[best]}: {medians[best]}",
         outcomes=_outcomes(labels[0], rows, item.hearing.significance),
     )
     match item.hearing.rule.kind:

@@ -15,12 +15,16 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.report.figures import style
-from evoexp.report.pages import build
+from evoexp.report.pages import build, page_registration
+from evoexp.report.pages.page_builder import PageBuilder, family_comparisons
+from evoexp.report.pages.page_file import read_page_file
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.pages.page_scope import Functions, Scope
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.claim_rules import Rule
-from evoexp.report.statistics.judging import Hearing
+from evoexp.report.statistics.judging import Hearing, Judge
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory
 
@@ -110,6 +114,25 @@ def page_settings(name: str, figures: str | None = None) -> ReportSettings:
     """Return settings for an experiment's own page, or another one."""
     pages = {"formats": ("svg",), "figures": figures or smoke_experiment(name).report.figures}
     return ReportSettings(**REPORT | pages)  # type: ignore[arg-type]
+
+
+def page_claims(
+    page: str, results: Results, reason: str | None = "", **functions: Callable[..., Any]
+) -> list[Claim]:
+    """Return the claims of a page, with other functions of these names.
+
+    They are not judged for this reason; None: judged as the results are.
+    """
+    settings = page_settings("", page)
+    own = read_page_file(page_registration(settings).target.partition(":")[0])
+    file = own._replace(functions=Functions({**own.functions, **functions}))
+    values: dict[str, Any] = {"results": results, "settings": settings, "rules": file.rules}
+    if reason is not None:
+        values["judge"] = Judge(reason, settings, file.rules)
+    entry = file.entries["pages"][page]
+    scope = Scope(file.functions, {**values, "paper": file.name})
+    compared = family_comparisons(scope, entry)
+    return list(PageBuilder(file, scope.inner(compared=compared)).claims(entry["claims"]))
 
 
 def smoke_report(outputs: Path, name: str) -> Path:

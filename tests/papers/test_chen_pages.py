@@ -9,14 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.papers.chen import cases as case_results
-from evoexp.papers.chen import path_claims, placement_claims
+from evoexp.papers.chen import path_claims
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import placements
 from evoexp.papers.chen.figures.printed_fields import MISSING, SURPLUS, WRONG, compare
 from evoexp.papers.chen.path_claims import inside_points, routes, signature
-from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.statistics import judging
-from report_samples import page_settings, smoke_report, smoke_results
+from report_samples import page_claims, smoke_report, smoke_results
 
 CENTRES = inside_points([(2, 2, 3, 3), (6, 2, 7, 3)])
 ABOVE = np.array([[0, 2], [1, 4], [4, 5], [9, 2]], dtype=float)
@@ -62,7 +61,8 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
         assert group.bound <= group.optimum
         assert [c.is_control for c in group.conditions] == [False, False, True, True]
         assert all((c.column("best_cost") >= group.bound - 1e-9).all() for c in group.conditions)
-    assert path_claims.shortest(groups) == pytest.approx(39.62741699796952)
+        assert group.truth is not None
+        assert path_claims.shortest_known(group.truth) == pytest.approx(39.62741699796952)
 
 
 @pytest.fixture(scope="module")
@@ -104,10 +104,9 @@ def test_gaps_are_those_of_the_summaries(cases: list[Case]) -> None:
     )
 
 
-def test_verdicts_where_they_are_judged(cases: list[Case]) -> None:
-    rules = read_page_file("evoexp.papers.chen").rules
-    judge = judging.Judge("", page_settings("chen_placement"), rules)
-    verdicts = {c.text: c.verdict for c in placement_claims.judge_cases(judge, cases)}
+def test_verdicts_where_they_are_judged(outputs: Path) -> None:
+    judged = page_claims("chen_placement", smoke_results(outputs, "chen_placement"))
+    verdicts = {c.text: c.verdict for c in judged}
     norm = "the best posture has a torque norm of"
     for text, verdict in {
         f"least torque norm: {norm} 1.73": judging.REPRODUCED,

@@ -16,6 +16,7 @@ from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import judging
 from evoexp.report.statistics.judging import CONTRADICTED, NOT_JUDGED, REPRODUCED, UNDECIDED
+from report_samples import page_claims
 from shipped_conditions import expanded
 
 RULES = read_page_file("evoexp.papers.corsepius").rules
@@ -46,10 +47,7 @@ def study(name: str) -> list[Claim]:
         return columns | {"solved": solved, "certified": TRUE, "certificate_s": np.zeros(RUNS)}
 
     results = made_up("corsepius_population", rows)
-    tasks = measures.tasks(results, "num_offspring")
-    metrics = paper_claims.METRICS
-    compared = {each: paper_claims.compare_sizes(tasks, each, SETTINGS) for each in metrics}
-    return list(paper_claims.judge_study(JUDGE, results, tasks, compared))
+    return page_claims("corsepius_population", results)
 
 
 FASTER = "Larger populations do not plan faster, on any task: "
@@ -116,7 +114,7 @@ def task_rows(having: dict[str, int], label: str, free: int = RUNS) -> dict[str,
 def judged(name: str, having: dict[str, int], free: int = RUNS) -> dict[str, str]:
     """Return the verdicts on a task of which only some runs of each condition meet the goal."""
     results = made_up(name, partial(task_rows, having, free=free))
-    return {claim.text: claim.verdict for claim in paper_claims.judge_tasks(JUDGE, results)}
+    return {claim.text: claim.verdict for claim in page_claims("corsepius", results)}
 
 
 def test_obstacles_that_never_act_say_nothing() -> None:
@@ -126,7 +124,7 @@ def test_obstacles_that_never_act_say_nothing() -> None:
             empty = "empty scene" in label
             return task_rows({}, label) | {"best_cost": np.full(RUNS, 0.0 if empty else cost)}
 
-        judged = paper_claims.judge_tasks(JUDGE, made_up("corsepius_pose", rows))
+        judged = page_claims("corsepius", made_up("corsepius_pose", rows))
         assert {claim.name for claim in judged if claim.text.startswith("pose: ")} == names
 
 
@@ -184,12 +182,12 @@ def test_empty_scenes_are_controls_and_make_no_claims_of_their_own() -> None:
 def test_allowed_contacts_are_named_with_the_verdict() -> None:
     contacts = {"allowed_contacts": ["table – bottle, hand – bottle"] * RUNS}
     results = made_up("corsepius_pick_and_place", lambda label: task_rows({}, label) | contacts)
-    claims = paper_claims.judge_tasks(JUDGE, results)
+    claims = page_claims("corsepius", results)
     told = next(c.evidence for c in claims if c.name == "paths_avoid_obstacles")
     assert "may touch, 0.001 m deep at most: table – bottle, hand – bottle" in told
 
 
 def test_below_the_papers_budget_nothing_is_judged() -> None:
     results = made_up("corsepius_wall", partial(task_rows, {"wall": 0}))._replace(budget="smoke")
-    for claim in paper_claims.judge_tasks(judging.judge(results, SETTINGS, RULES), results):
+    for claim in page_claims("corsepius", results, reason=None):
         assert claim.verdict.startswith(NOT_JUDGED)

@@ -24,6 +24,7 @@ from evoexp.report.statistics.judging import (
     Judge,
     judge,
 )
+from report_samples import page_claims
 
 RULES = read_page_file("evoexp.papers.lavoie").rules
 SETTINGS = report_samples.page_settings("", "lavoie")
@@ -133,42 +134,16 @@ def test_runs_need_no_start_if_they_fail_no_more_often_than_the_papers(
     assert "lies above −1 point; contradicted if it lies below −1 point" in found.rule
 
 
-def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
-    results = two_arms(964, 999)
-    own = judge(results, SETTINGS, RULES)
-    below_1, below_2 = claims.more_joints_are_better(own, results.conditions)
-    assert (below_1.verdict, below_2.verdict) == (REPRODUCED, EQUAL)
-    assert "Fisher's exact p = 4.1e−10" in below_1.evidence
-    assert list(claims.more_joints_are_better(own, results.conditions[:1])) == []
-
-
-def test_motions_in_contact_contradict() -> None:
-    results = two_arms(1000, 1000)
-    own, (seven, ten) = judge(results, SETTINGS, RULES), results.conditions
-    certified = pd.array(np.arange(1000) >= 115, dtype="boolean")
-    found = claims.free_of_collision(own, changed(seven, certified=certified))
-    assert found.verdict == CONTRADICTED
-    assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
-    assert claims.free_of_collision(own, ten).verdict == REPRODUCED
-
-
 def sweep(results: Results, contacts: dict[str, int] | None = None) -> list[Claim]:
     """Return the claims of a sweep; some accepted runs of each condition, by label, in contact."""
 
-    def refuted(c: ConditionResults) -> RefutedMotions:
-        none = Proportion(0, c.solved)
-        return RefutedMotions(Proportion((contacts or {}).get(c.label, 0), c.solved), none, none)
+    def refuted(condition: ConditionResults) -> RefutedMotions:
+        solved, touching = condition.solved, (contacts or {}).get(condition.label, 0)
+        return RefutedMotions(Proportion(touching, solved), *[Proportion(0, solved)] * 2)
 
-    own = judge(results, SETTINGS, RULES)
-    return [
-        *claims.either_success(own, results),
-        *claims.precision(own, results),
-        *claims.generations(own, results),
-        *claims.coding(own, results),
-        *claims.blindness(own, results, refuted),
-        *claims.judge_controls(own, results),
-        *claims.positions(own, results, refuted),
-    ]
+    others = ("pseudoinverse", "between_points")  # entries of their own
+    found = page_claims("lavoie_sweep", results, refuted=refuted)
+    return [c for c in found if not any(name in c.name for name in others)]
 
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:

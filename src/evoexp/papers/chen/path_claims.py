@@ -1,7 +1,7 @@
 """The grid paths of Chen & Zalzala 1995: weightings, gaps to the truth, routes; their claims."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,9 @@ from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results import run_measures
 from evoexp.report.results.run_measures import counted, planned
 from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import adjusted, by_column, compared
+from evoexp.report.statistics.inference import Proportion
 from evoexp.report.statistics.judging import Judge, evidence
 
 # name of a route (A, B, …; A is the most frequent) → keys of its paths
@@ -74,12 +76,6 @@ def groups(results: Results) -> tuple[Group, ...]:
         weights, revisits = members[0].planner.objective.weights, members[0].planner.revisits
         found += [Group(c.label, weights, revisits, evolved, truth) for c in evolved[:1]]
     return tuple(found)
-
-
-def shortest(groups: tuple[Group, ...]) -> float:
-    """Return the length of the shortest path [cell]; NaN without a reference."""
-    known = (shortest_known(g.truth) for g in groups if g.truth is not None)
-    return min(known, default=np.nan)
 
 
 def truth(results: Results, condition: ConditionResults) -> ConditionResults | None:
@@ -181,49 +177,6 @@ def _name(number: int) -> str:
     return (_name(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
-    """Judge the claims of Fig. 2: they need its three weightings, in their order."""
-    yield nearly_shortest(judge, groups[0].main, shortest(groups))
-    if len(groups) == 3:
-        a, b, c = (group.main for group in groups)
-        unsafeness, distance = by_column(UNSAFENESS), by_column(DISTANCE)
-        safer = compared([(b, a)], unsafeness, judge.settings)
-        shorter = compared([(b, c)], distance, judge.settings)
-        told = "; ".join(
-            f"against {other.label}: {evidence(row, word)}"
-            for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
-            for row in rows
-        )
-        hearing = judge.on("compromise", condition=b.label, first=a.label, last=c.label)
-        yield hearing.better_than_all(told, adjusted([*safer, *shorter]))
-        hearing = judge.on("safest", condition=c.label, other=b.label)
-        yield hearing.better(judge.compared(c, b, unsafeness), "safer")
-        yield much_longer(judge, c, shortest(groups), groups[2].truth)
-    # the best cost decreases, and the average cost converges toward it
-    for main in (group.main for group in groups):
-        generations = main.generations.sort_values("index").groupby("replicate")
-        first, last = generations.first(), generations.last()
-        hearing = judge.on("converges", condition=main.label)
-        most = 1.0 + hearing.rule.limits["spread_percent"] / 100.0
-        lower = last["best_cost"] < first["best_cost"]
-        runs = counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
-        complete = 0 < main.planned <= main.done
-        holds = False if runs.having < main.done else True if complete else None
-        yield hearing.own({"runs": runs}, main.done, holds)
-    if len(groups) == 3 and all(group.truth is not None for group in groups):
-        paths = {tuple(map(tuple, group.best_path[0].tolist())) for group in groups}
-        told = f"{len(paths)} different best paths known of {len(groups)} weightings"
-        yield judge.on("different_paths").own(told, len(groups), len(paths) == len(groups))
-    for group in groups:
-        if group.truth is not None:
-            yield nearly_best(judge, group.main, group.optimum, group.bound)
-    for group in groups:
-        controls = tuple(c for c in group.conditions if c.is_control)
-        for own in group.conditions if controls else ():
-            if not own.is_control:
-                yield evolution(judge, own, controls)
-
-
 def tuned(results: Results) -> list[tuple[str, str]]:
     """Return labels of the first map: of the best setting on the other maps, and its control's.
 
@@ -254,39 +207,62 @@ def excess(condition: ConditionResults, shortest_known: float) -> FloatArray:
     return np.asarray(100.0 * (condition.column(DISTANCE) / shortest_known - 1.0))
 
 
-def nearly_shortest(judge: Judge, condition: ConditionResults, shortest: float) -> Claim:
-    """Judge that paths are nearly shortest without safety."""
-    hearing = judge.on("nearly_shortest", condition=condition.label)
-    longer = excess(condition, shortest)
-    near = counted(longer <= hearing.rule.limits["near_percent"])
-    told = {"length": np.median(condition.column(DISTANCE)), "excess": np.median(longer)}
-    return hearing.majority(told | {"shortest": shortest, "near": near}, *near)
+def compromise(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
+    """Judge that the second weighting's paths are safer than the first's, shorter than the last's.
+
+    Both comparisons are one family. No claim without the three weightings of Fig. 2.
+    """
+    if len(groups) == 3:
+        a, b, c = (group.main for group in groups)
+        safer = compared([(b, a)], by_column(UNSAFENESS), judge.settings)
+        shorter = compared([(b, c)], by_column(DISTANCE), judge.settings)
+        told = "; ".join(
+            f"against {other.label}: {evidence(row, word)}"
+            for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
+            for row in rows
+        )
+        hearing = judge.on("compromise", condition=b.label, first=a.label, last=c.label)
+        yield hearing.better_than_all(told, adjusted([*safer, *shorter]))
 
 
-def nearly_best(
-    judge: Judge, condition: ConditionResults, cost_known: float, bound_known: float
-) -> Claim:
-    """Judge that costs are near that of the best path known."""
-    hearing = judge.on("nearly_best", condition=condition.label)
-    above = above_known(condition, cost_known)
-    near = counted(above <= hearing.rule.limits["near_percent"])
-    told = {"cost": float(np.median(condition.column(COST))), "above": float(np.median(above))}
-    told |= {"known": cost_known, "bound": bound_known}
-    return hearing.majority({**told, "near": near}, *near)
+def converging(condition: ConditionResults, rules: Rules) -> Proportion:
+    """Count the runs whose best cost falls and whose average converges toward the best."""
+    generations = condition.generations.sort_values("index").groupby("replicate")
+    first, last = generations.first(), generations.last()
+    most = 1.0 + rules["converges"].limits["spread_percent"] / 100.0
+    lower = last["best_cost"] < first["best_cost"]
+    return counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
 
 
-def much_longer(
-    judge: Judge, condition: ConditionResults, shortest_known: float, truth: ConditionResults | None
-) -> Claim:
-    """Judge that the safe path is much longer, and tell how long the best path known is."""
-    hearing = judge.on("much_longer", condition=condition.label)
-    percents = excess(condition, shortest_known)
-    longer = counted(percents > hearing.rule.limits["much_percent"])
-    told = f"median {np.median(percents):.0f} % longer, {longer} runs"
-    if truth is not None:
-        known = float(excess(truth, shortest_known)[0])
-        told += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
-    return hearing.majority(told, *longer)
+def converges(condition: ConditionResults, converging: Proportion) -> bool | None:
+    """Return whether all planned runs converge; None: not all of them are done."""
+    complete = 0 < condition.planned <= condition.done
+    return False if converging.having < condition.done else True if complete else None
+
+
+def different_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
+    """Judge that the best paths known of the three weightings differ."""
+    if len(groups) == 3 and all(group.truth is not None for group in groups):
+        paths = len({tuple(map(tuple, group.best_path[0].tolist())) for group in groups})
+        told = {"paths": paths, "weightings": len(groups)}
+        yield judge.on("different_paths").own(told, len(groups), paths == len(groups))
+
+
+def known_excess(truth: ConditionResults | None, shortest_known: float) -> str:
+    """Return how long the best path known is, in words; empty without a reference."""
+    if truth is None:
+        return ""
+    known = float(excess(truth, shortest_known)[0])
+    return f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
+
+
+def evolutions(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
+    """Judge that evolution helps, whatever the weighting."""
+    for group in groups:
+        controls = tuple(c for c in group.conditions if c.is_control)
+        for own in group.conditions if controls else ():
+            if not own.is_control:
+                yield evolution(judge, own, controls)
 
 
 def evolution(
@@ -318,3 +294,16 @@ def control_name(condition: ConditionResults) -> str:
     """Return the name of a control in sentences."""
     component = str(condition.condition.planner.component)
     return {"random_search": "random walks"}.get(component, component.replace("_", " "))
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "near_shortest": lambda excess, rules: (
+        excess <= rules["nearly_shortest"].limits["near_percent"]
+    ),
+    "is_longer": lambda excess, rules: excess > rules["much_longer"].limits["much_percent"],
+    "near_best": lambda above_known, rules: (
+        above_known <= rules["nearly_best"].limits["near_percent"]
+    ),
+    "median_excess": lambda excess: np.median(excess),
+    "median_above": lambda above_known: np.median(above_known),
+}

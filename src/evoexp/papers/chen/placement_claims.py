@@ -1,7 +1,8 @@
 """The claims of Chen & Zalzala 1995 on docking postures, judged by exact optima and controls."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -10,7 +11,6 @@ from evoexp.papers.chen.cases import METHODS, Case
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim, EffectSize
-from evoexp.report.statistics.comparisons import by_column, compared
 from evoexp.report.statistics.inference import Interval, Proportion, fisher_exact
 from evoexp.report.statistics.judging import Judge
 
@@ -107,68 +107,7 @@ def _signed(text: str) -> str:
     return text.replace("-", "−")
 
 
-def judge_cases(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
-    """Judge all claims; the optimum of every case is known."""
-    for case in exact_cases:
-        yield from judge_printed(judge, case)
-        if case.plain is not None:
-            hearing = judge.on("near_posture", case=case.name)
-            near = case.within(
-                case.plain.column("best_cost"), hearing.rule.limits["near_percent"] / 100.0
-            )
-            yield hearing.majority(judge.share(near), *near)
-    yield from _evener_torques(judge, exact_cases)
-    yield from _against_search(judge, exact_cases)
-    for case in exact_cases:
-        yield from _against_conventional(judge, case)
-    for case in exact_cases:
-        if case.name == MANIPULABILITY:
-            yield judge.on("many_optima", case=case.name).at_least(float(len(case.minima)))
-        if case.name in SECONDS and case.plain is not None:
-            seconds = float(np.median(case.plain.column("cpu_s")))
-            beside, where = SECONDS[case.name]
-            hearing = judge.on("seconds", case=case.name, beside=beside, where=where)
-            told, holds = {"milliseconds": 1e3 * seconds}, seconds <= hearing.rule.limits["most_s"]
-            yield hearing.own(told, case.plain.done, holds)
-
-
-def _evener_torques(judge: Judge, cases: list[Case]) -> Iterator[Claim]:
-    """Judge that the minimax criterion loads the joints more evenly than the least norm."""
-    ratios = {}
-    for case in cases:
-        sizes = np.abs(case.torques(case.optimal_angles))
-        ratios[case.name] = float(sizes.max() / sizes.min())
-    if {"least torque norm", "minimax torque"} <= ratios.keys():
-        norm, minimax = ratios["least torque norm"], ratios["minimax torque"]
-        told = {"norm": norm, "minimax": minimax}
-        yield judge.on("evener_torques").own(told, 2, minimax < norm)
-
-
-def _against_search(judge: Judge, cases: list[Case]) -> list[Claim]:
-    """Judge that the genetic algorithm, with and without elitism, beats random search."""
-    pairs = {
-        own.label: (case, name, own, case.search)
-        for case in cases
-        for name, own in (("without elitism", case.plain), ("with elitism", case.elitist))
-        if own is not None and case.search is not None
-    }
-    rows = compared(
-        [(own, search) for _, _, own, search in pairs.values()],
-        by_column("best_cost"),
-        judge.settings,
-        named=lambda own, _: own.label,
-    )
-    claims = []
-    for row in rows:
-        case, name, own, search = pairs[row.quantity]
-        medians = (float(np.median(c.column("best_cost"))) for c in (own, search))
-        told = "median {} against {}: ".format(*map(markdown.number, medians))
-        hearing = judge.on("placement_evolution", case=case.name, elitism=name)
-        claims.append(hearing.better(row, "lower E", told + "{}"))
-    return claims
-
-
-def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
+def against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge that conventional methods get stuck, and that the genetic algorithm does better."""
     for method, ends in case.ends().items():
         hearing = judge.on("gets_stuck", case=case.name, method=method)
@@ -205,3 +144,41 @@ def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
         size = EffectSize("ratio of efforts per success", ratio, low, high, 1.0)
         counted = f"{own.total} and {at_best.total}"
         yield efforts.own(text.replace("inf", "∞"), counted, holds, size)
+
+
+def evener_torques(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
+    """Judge that the minimax criterion loads the joints more evenly than the least norm."""
+    ratios = {}
+    for case in exact_cases:
+        sizes = np.abs(case.torques(case.optimal_angles))
+        ratios[case.name] = float(sizes.max() / sizes.min())
+    if {"least torque norm", "minimax torque"} <= ratios.keys():
+        told = {"norm": ratios["least torque norm"], "minimax": ratios["minimax torque"]}
+        yield judge.on("evener_torques").own(told, 2, told["minimax"] < told["norm"])
+
+
+def in_seconds(judge: Judge, case: Case) -> Claim | None:
+    """Judge the time that the paper prints, of criteria for which it prints one."""
+    if case.name not in SECONDS or case.plain is None:
+        return None
+    seconds = float(np.median(case.plain.column("cpu_s")))
+    beside, where = SECONDS[case.name]
+    hearing = judge.on("seconds", case=case.name, beside=beside, where=where)
+    holds = seconds <= hearing.rule.limits["most_s"]
+    return hearing.own({"milliseconds": 1e3 * seconds}, case.plain.done, holds)
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "near_optimum": lambda condition, case, rules: case.within(
+        condition.column("best_cost"), rules["near_posture"].limits["near_percent"] / 100.0
+    ),
+    # (criterion, how it was evolved, its runs) of those that random search stands beside
+    "evolved_beside_search": lambda exact_cases: [
+        (case, elitism, run)
+        for case in exact_cases
+        for elitism, run in (("without elitism", case.plain), ("with elitism", case.elitist))
+        if run is not None and case.search is not None
+    ],
+    "is_manipulability": lambda case: case.name == MANIPULABILITY,
+    "num_minima": lambda case: float(len(case.minima)),
+}

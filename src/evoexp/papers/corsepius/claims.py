@@ -1,13 +1,12 @@
 """The claims of Corsépius 2001: on tasks, and on the size of the population, metric by metric."""
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.papers.corsepius import measures
-from evoexp.papers.corsepius.measures import Tasks
-from evoexp.planners.posture_es.phases import Problem
+from evoexp.papers.corsepius.measures import Conditions, Tasks
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
@@ -16,7 +15,7 @@ from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference, judging
 from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Interval, quantile
-from evoexp.report.statistics.judging import Judge, fisher_evidence
+from evoexp.report.statistics.judging import Judge
 
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
@@ -33,25 +32,10 @@ METRICS: dict[str, Values] = {
 }
 
 
-def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
-    """Judge the claims that the conditions of an experiment allow to judge."""
-    found = measures.obstructed(results.main)
-    for c in found:
-        yield judge_met(judge, c)
-        if avoids := judge_free(judge, c, results):
-            yield avoids
-        yield from _tilt(judge, c)
-        # the planning time that the paper prints beside ours
-        objects = [getattr(phase.goal, "object", "") for phase in c.scenario.phases]
-        if objects == [BALL] and c.solved:
-            times, cycles = 1e3 * measures.usual_seconds(c), measures.cycles(c)
-            shapes = c.problem(Problem).bodies.num_shapes
-            words = {"milliseconds": times, "cycles": cycles, "shapes": shapes}
-            verdict = f"{judging.NOT_JUDGED} (another machine, another model)"
-            yield judge.on("planning_time", who=c.label).made(words, c.done, verdict)
-    # for highly redundant arms the approach finds a certified path
+def redundant_arms(judge: Judge, obstructed: Conditions) -> Iterator[Claim]:
+    """Judge that for highly redundant arms the approach finds a certified path."""
     many = judge.rules["redundant_arms"].limits["joints"]
-    arms = [c for c in found if run_measures.num_joints(c) > many]
+    arms = [c for c in obstructed if run_measures.num_joints(c) > many]
     free = {c.label: run_measures.certified(c).having for c in arms}
     told = "; ".join(
         f"{c.label}, {run_measures.num_joints(c)} joints: goal met "
@@ -61,82 +45,22 @@ def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
     if arms:
         runs = sum(c.done for c in arms)
         yield judge.on("redundant_arms").own(told, runs, any(free.values()))
-    # the search gets stuck where the same task with a sub-goal finds a way
-    for stuck, helped in measures.pairs_but_for("subgoals", found):
-        one, two = run_measures.success(helped), run_measures.success(stuck)
-        told = (
-            f"goal met {judge.share(two)}; {helped.label}: {judge.share(one)}; "
-            f"{fisher_evidence(one, two)}; ended by stagnation: "
-            f"{judge.share(measures.reasons(stuck)['stagnation'])}"
-        )
-        yield judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
-    if results.experiment in judge.rules["times_vary"].experiments:
-        yield _unforeseeable(judge, found)
-    if pairs := measures.pairs_but_for("empty_scene", results.main):
-        yield _at_obstacles(judge, pairs)
 
 
-def _unforeseeable(judge: Judge, conditions: measures.Conditions) -> Claim:
+def times_vary(judge: Judge, results: Results, obstructed: Conditions) -> Iterator[Claim]:
     """Judge that planning times differ from run to run: that they can hardly be foreseen."""
-    spreads = {}
-    for c in conditions:
-        efforts = measures.evaluations(c)
-        spreads[c.label] = quantile(efforts, 0.9) / quantile(efforts, 0.1)
     hearing = judge.on("times_vary")
-    times = hearing.rule.limits["times"]
-    wide = [name for name, ratio in spreads.items() if ratio > times]
-    told = ", ".join(f"{name} {ratio:.1f}" for name, ratio in spreads.items())
-    return hearing.own(told, sum(c.done for c in conditions), 2 * len(wide) > len(spreads))
+    if results.experiment in hearing.rule.experiments:
+        efforts = {c.label: measures.evaluations(c) for c in obstructed}
+        ratios = {name: quantile(e, 0.9) / quantile(e, 0.1) for name, e in efforts.items()}
+        wide = [name for name, ratio in ratios.items() if ratio > hearing.rule.limits["times"]]
+        told = ", ".join(f"{name} {ratio:.1f}" for name, ratio in ratios.items())
+        yield hearing.own(told, sum(c.done for c in obstructed), 2 * len(wide) > len(ratios))
 
 
-def judge_met(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge that goals given in work space are met by a search in configuration space."""
-    met = run_measures.success(condition)
-    hearing = judge.on("goals_met", who=condition.label)
-    return hearing.majority(f"goal met {judge.share(met)}", *met)
-
-
-def judge_free(judge: Judge, condition: ConditionResults, results: Results) -> Claim | None:
-    """Judge that binary ratings of distances keep the whole motion free.
-
-    None where no obstacle of the task ever acts: then its paths say nothing of obstacles.
-    """
-    if not measures.obstacles_act(condition, results):
-        return None
-    refuted, free = measures.refuted(condition), run_measures.certified(condition).having
-    planned = refuted.total if condition.done == condition.planned else 0
-    told = (
-        f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-        f"{judge.share(refuted)}: postures are free, motions between them are not rated"
-    )
-    if pairs := measures.allowed_contacts(condition):
-        limit, unit = float(condition.scenario.allowed_penetration), condition.length_unit
-        told += f"; may touch, {limit:g} {unit} deep at most: {pairs}"
-    hearing = judge.on("paths_avoid_obstacles", who=condition.label)
-    return hearing.every(told, free, refuted.total, planned)
-
-
-def _tilt(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
-    """Judge that a grasped object is not tilted."""
-    limits = {term: getattr(condition.planner.objective, term) for term in TILTS}
-    for term, limit in limits.items():
-        if limit is not None and condition.solved:
-            at, between = (
-                condition.column(f"term_greatest_{term}{part}_deg")[run_measures.solved(condition)]
-                for part in ("", "_between")
-            )
-            kept = run_measures.counted(between <= limit.limit)
-            told = (
-                f"greatest tilt at postures {markdown.number(float(at.max()))}°, between them "
-                f"{markdown.number(float(between.max()))}°, limit {limit.limit:g}°; within it all "
-                f"the way: {markdown.share(*kept)} solved runs"
-            )
-            planned = len(at) if condition.done == condition.planned else 0
-            yield judge.on("not_tilted", who=condition.label).every(told, *kept, planned)
-
-
-def _at_obstacles(judge: Judge, pairs: list[tuple[ConditionResults, ConditionResults]]) -> Claim:
+def stuck_at_obstacles(judge: Judge, main: Conditions) -> Iterator[Claim]:
     """Judge that obstacles, and nothing else, keep the search from its goals."""
+    pairs = measures.pairs_but_for("empty_scene", main)
     shares = [(run_measures.success(c), run_measures.success(empty)) for c, empty in pairs]
     adjusted = inference.fisher_family(shares)
     told = "; ".join(
@@ -148,9 +72,10 @@ def _at_obstacles(judge: Judge, pairs: list[tuple[ConditionResults, ConditionRes
         for (own, empty), p in zip(shares, adjusted, strict=True)
         if own.share < empty.share
     ]
-    runs = sum(one.total for pair in shares for one in pair)
-    holds = True if any(less) else None if less else False
-    return judge.on("stuck_at_obstacles").own(told, runs, holds)
+    if pairs:
+        runs = sum(one.total for pair in shares for one in pair)
+        holds = True if any(less) else None if less else False
+        yield judge.on("stuck_at_obstacles").own(told, runs, holds)
 
 
 class SizeComparison(NamedTuple):
@@ -253,21 +178,16 @@ def _larger(judge: Judge, metric: str, compared: list[SizeComparison]) -> Iterat
     says: dict[str, list[int]] = {}
     for row in rows:
         says.setdefault(row.task, []).append(row.says)
-    told = (
-        f"expected {metric} over those of 100 individuals, λ in brackets: less for "
-        f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)}"
-    )
+    told = {"metric": metric, "less": _ratios(rows, -1), "more": _ratios(rows, 1)}
     seen = {row.says for row in rows}
     hearing = judge.on("larger_no_faster", metric=metric)
     yield hearing.own(told, f"{len(rows)} ratios", _unless(-1 in seen, 1 in seen))
     never = [name for name, own in says.items() if min(own) >= 0]
     slower = [name for name in never if max(says[name]) > 0]
-    told = (
-        f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
-        f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them"
-    )
     hearing = judge.on("larger_not_necessarily_faster", metric=metric)
-    yield hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
+    words: dict[str, object] = {"tasks": len(says), "never": len(never), "slower": len(slower)}
+    words |= {"names": ", ".join(never) or "–"}
+    yield hearing.own(words, f"{len(says)} tasks", _unless(not never, slower))
 
 
 def _over_proportional(
@@ -277,10 +197,8 @@ def _over_proportional(
     rows = [row for row in compared if row.value < RECOMMENDED]
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
-    told = (
-        f"above: {_ratios(rows, 1)}; below: {_ratios(rows, -1)}; not certain: {says.count(0)} of "
-        f"{len(rows)}"
-    )
+    told: dict[str, object] = {"above": _ratios(rows, 1), "below": _ratios(rows, -1)}
+    told |= {"uncertain": says.count(0), "count": len(rows)}
     hearing = judge.on("smaller_over_proportional", metric=metric, how=how, exceeds=exceeds)
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
@@ -299,10 +217,7 @@ def _converges_less(judge: Judge, how: str, sizes: list[SizePair]) -> Claim:
         if said
     )
     less, more = says.count(1), says.count(-1)
-    told = (
-        f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
-        f"often in {more}: {texts or '–'}"
-    )
+    told = {"less": less, "more": more, "pairs": len(pairs), "texts": texts or "–"}
     hearing = judge.on("smaller_converge_less", how=how)
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
@@ -325,3 +240,34 @@ def _reasonable(judge: Judge, size: float, metric: str, found: Tasks, values: Va
     hearing = judge.on("reasonable", size=f"{size:g}", word=word, where=where, metric=metric)
     against = any(factor > most for factor, _ in factors.values())
     return hearing.own(told, f"{len(factors)} tasks", _unless(against, factors))
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # (a task without sub-goals, the same one with them)
+    "sub_goal_pairs": lambda obstructed: measures.pairs_but_for("subgoals", obstructed),
+    # the paper prints the planning time of this task
+    "is_ball": lambda condition: (
+        [getattr(phase.goal, "object", "") for phase in condition.scenario.phases] == [BALL]
+        and condition.solved
+    ),
+    "milliseconds": lambda condition: 1e3 * measures.usual_seconds(condition),
+    # solved runs of a condition whose planned runs are all done
+    "solved_of_planned": lambda condition: condition.solved * (condition.done == condition.planned),
+    # the tilts of a grasped object that the task of solved runs limits, each with its limit
+    "limited_tilts": lambda condition: [
+        (term, limit.limit)
+        for term in TILTS
+        for limit in (getattr(condition.planner.objective, term),)
+        if limit is not None and condition.solved
+    ],
+    "tilt_at": lambda condition, tilt: measures.tilts_of_solved(condition, tilt),
+    "tilt_between": lambda condition, tilt: measures.tilts_of_solved(condition, f"{tilt}_between"),
+    "not_tilted": lambda tilt_between, most: tilt_between <= most,
+    # which contacts the exact verdict allows
+    "may_touch": lambda condition: (
+        f"; may touch, {float(condition.scenario.allowed_penetration):g} {condition.length_unit} "
+        f"deep at most: {pairs}"
+        if (pairs := measures.allowed_contacts(condition))
+        else ""
+    ),
+}

@@ -90,6 +90,12 @@ def usual_seconds(condition: ConditionResults) -> FloatArray:
     return evaluations(condition) * price
 
 
+def tilts_of_solved(condition: ConditionResults, term: str) -> FloatArray:
+    """Return the greatest tilt of the grasped object in each solved run, (solved,) [deg]."""
+    tilts = condition.column(f"term_greatest_{term}_deg")
+    return np.asarray(tilts[run_measures.solved(condition)])
+
+
 def residuals(condition: ConditionResults) -> FloatArray:
     """Return each run's distance to the goal of its last phase, (done,) [length unit]."""
     return np.abs(condition.column("term_goal_distance"))

@@ -17,13 +17,11 @@ from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.comparisons import Comparison, Family, FamilyComparison, Measure
-from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles, spread
+from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles
 from evoexp.report.statistics.judging import Judge
 
 # says nothing about convergence
 COLLIDES = "solved motion collides between its configurations (exact verdict)"
-MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
-READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetric"}
 Statistic = Callable[[ConditionResults, np.ndarray], FloatArray]
 
 
@@ -71,57 +69,9 @@ def _without_substeps(condition: ConditionResults) -> str:
     return repr(planner | {"collision": planner["collision"] | {"collision_substeps": None}})
 
 
-def of_sweep(
-    judge: Judge, results: Results, compared: Sequence[FamilyComparison]
-) -> Iterator[Claim]:
-    """Judge the claims that a sweep can judge, chosen by the settings that differ."""
-    settings = [c.planner.canonical() for c in results.with_data]
-    flat = [
-        {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in settings
-    ]
-    varied = {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
-    level = judge.settings.significance
-    is_rate = varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}
-    for one in _converging(compared):
-        if varied == {"ga.hall_depth"}:
-            first, *others = results.with_data
-            own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
-            best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
-            evidence = (
-                f"median {markdown.number(own)}; best of the others {best.label}: "
-                f"{markdown.number(median)}; {_outcomes(first, one.rows, level)}"
-            )
-            hearing = judge.on("depth", depth=first.label, measure=one.measure.name)
-            yield hearing.best(evidence, one.rows, own <= min(medians))
-        elif is_rate and one.rows:
-            first = one.family.pairs[0][0]
-            reading = READINGS[first.planner.ga.mutation_direction]
-            words = {"who": "", "measure": one.measure.name, "reading": reading}
-            evidence = _outcomes(first, one.rows, level)
-            yield judge.on("falling_rate", **words).better_than_all(evidence, one.rows)
-
-
 def _converging(found: Sequence[FamilyComparison]) -> list[FamilyComparison]:
     """Return the comparisons in quantities that say how fast or how far a method converges."""
     return [one for one in found if one.measure.name != COLLIDES]
-
-
-def _outcomes(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
-    """List the conditions that the first is better than, worse than, or not told from."""
-    words = {
-        1: "is significantly better than",
-        -1: "is significantly worse than",
-        0: "cannot be told from",
-    }
-    parts = []
-    for sign, word in words.items():
-        named = [
-            f"{row.quantity} (A12 {row.better.a12:.2f}, p = {markdown.p_value(row.p_adjusted)})"
-            for row in rows
-            if row.says(significance) == sign
-        ]
-        parts += [f"{word} {', '.join(named)}"] * bool(named)
-    return f"{first.label} {'; '.join(parts)}"
 
 
 def converging_rows(compared: Sequence[FamilyComparison]) -> dict[str, tuple[Comparison, ...]]:

@@ -146,9 +146,7 @@ def near_best(condition: ConditionResults, results: Results, rules: Rules) -> Bo
 
 def early_cost(condition: ConditionResults) -> FloatArray:
     """Return the cost of each run's best team at generation 30, (done,); inf: it has none."""
-    rows = condition.generations
-    costs = rows[rows["index"] <= EARLY].groupby("replicate")["best_cost"].min()
-    return _of_runs(condition, costs)
+    return _best_until(condition, "index", EARLY)
 
 
 def cost_at_equal_effort(condition: ConditionResults, results: Results) -> FloatArray:
@@ -157,8 +155,12 @@ def cost_at_equal_effort(condition: ConditionResults, results: Results) -> Float
     Shape (done,); inf where it has no team by then.
     """
     budget = min(float(c.column("evaluations").min()) for c in results.with_data)
+    return _best_until(condition, "evaluations", budget)
+
+
+def _best_until(condition: ConditionResults, column: str, most: float) -> FloatArray:
     rows = condition.generations
-    costs = rows[rows["evaluations"] <= budget].groupby("replicate")["best_cost"].min()
+    costs = rows[rows[column] <= most].groupby("replicate")["best_cost"].min()
     return _of_runs(condition, costs)
 
 

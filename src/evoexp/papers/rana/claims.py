@@ -1,6 +1,7 @@
 """The claims of Rana & Zalzala 1995, judged by their experiments, ablations and controls."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +16,15 @@ from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import Comparison, Family, Measure
-from evoexp.report.statistics.inference import fisher_family, spread
+from evoexp.report.statistics.inference import Proportion, fisher_family
 from evoexp.report.statistics.judging import Judge
 
 PRINTED = "as printed"  # label of the printed setting among the ablations
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
-ASSUMED = "sections 3.5 and 4.2"  # where the paper makes claims that assumed numbers touch
 COST = "best cost"
+BEST = comparisons.by_column("best_cost")
 COMPARED = (
-    Measure(COST, comparisons.by_column("best_cost")),
+    Measure(COST, BEST),
     Measure(EVENNESS, measures.unevenness, "deg"),
 )
 Controls = Sequence[ConditionResults]
@@ -49,60 +50,6 @@ def own_judge(
     return Judge(not_judged(results, condition), settings, rules)
 
 
-def free_at_via_points(own_judge: Judge, condition: ConditionResults, who: str) -> Claim:
-    """Judge that the motion is free of collision at the via-points."""
-    source = "section 3.5, Fig. 4" if measures.planar(condition) else "section 4.2, Fig. 11"
-    return _free(own_judge, condition, who, source)
-
-
-def assumed_free(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge that the motion is free at the via-points, under assumed numbers."""
-    return _free(judge, condition, "", ASSUMED)
-
-
-def _free(judge: Judge, c: ConditionResults, who: str, source: str) -> Claim:
-    told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
-    hearing = judge.on("free_at_via_points", who=who, source=source)
-    return hearing.majority(told, c.solved, c.done)
-
-
-def safety(own_judge: Judge, condition: ConditionResults, who: str) -> Iterator[Claim]:
-    """Judge the safety distance, where the paper looks and where it does not."""
-    c, unit, margin = condition, condition.length_unit, measures.margin(condition)
-    source = "section 3.5, Fig. 7" if measures.planar(c) else "section 4.2, Fig. 13"
-    kept = markdown.share(c.verdicts.with_margin, c.verdicts.judged)
-    bodies = (
-        f"; the bodies themselves come as close as "
-        f"{markdown.number(float(c.column('clearance').min()))} {unit} (margin certified in {kept})"
-    )
-    for name, column, more in (
-        ("safety_at_via_points", AT, ""),
-        ("safety_between_via_points", BETWEEN, bodies),
-    ):
-        values = c.column(column)
-        safe = int(np.count_nonzero(values >= margin))
-        told = (
-            f"{markdown.share(safe, c.done)} runs never below {margin:g} {unit}; least "
-            f"{markdown.number(float(np.min(values)))}, median "
-            f"{markdown.number(spread(values).median)} {unit}{more}"
-        )
-        hearing = own_judge.on(name, who=who, source=source)
-        yield hearing.majority(told, safe, c.done)
-
-
-def assumed_safety(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge the safety distance between via-points under assumed numbers."""
-    c, values = condition, measures.safety_share(condition)
-    safe = int(np.count_nonzero(values >= 1.0))
-    told = (
-        f"{markdown.share(safe, c.done)} runs never below it; least "
-        f"{markdown.number(float(np.min(values)))} times, at via-points "
-        f"{markdown.number(float(np.min(c.column(AT))) / measures.margin(c))} times"
-    )
-    hearing = judge.on("safety_between_via_points", who="", source=ASSUMED)
-    return hearing.majority(told, safe, c.done)
-
-
 def operators(
     results: Results, own_judge: Judge, condition: ConditionResults, who: str
 ) -> list[Claim]:
@@ -114,23 +61,6 @@ def operators(
     told = f"its ablations are not stored: `evoexp run experiment={experiment}`"
     alone = own_judge.on("operators_improve", who=who, without="each alone")
     return operator_claims(stored, own, who, PRINTED) or [alone.elsewhere(told)]
-
-
-def evolution(results: Results, own_judge: Judge, condition: ConditionResults, who: str) -> Claim:
-    """Judge what evolution adds to every control."""
-    beside = [
-        c
-        for c in results.evolved
-        if c.is_control and comparisons.beside(condition.condition, c.condition)
-    ]
-    told, rows = measures.evolution_told(own_judge, condition, beside)
-    return own_judge.on("evolution_adds", who=who).better_than_all(told, rows)
-
-
-def assumed_evolution(judge: Judge, condition: ConditionResults, controls: Controls) -> Claim:
-    """Judge what evolution adds to every control, under assumed numbers."""
-    told, rows = measures.evolution_told(judge, condition, controls)
-    return judge.on("evolution_adds", who="").better_than_all(told, rows)
 
 
 def operator_claims(results: Results, judge: Judge, who: str = "", first: str = "") -> list[Claim]:
@@ -156,12 +86,11 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
         other = counts[part.label]
         says = [by[part.label].says(level) for by in rows.values() if part.label in by]
         says.append(judging.greater(other, own, p_value, level))
-        told = (
-            f"{_told(rows[COST].get(part.label), COST, '–')}; "
-            f"{_told(rows[EVENNESS].get(part.label), EVENNESS, 'deg', (printed, part))}; "
-            f"refuted motions {markdown.share(own.having, own.total)} with, "
-            f"{markdown.share(other.having, other.total)} without, p = {markdown.p_value(p_value)}"
-        )
+        told: dict[str, object] = {
+            "cost": _told(rows[COST].get(part.label), COST, "–"),
+            "evenness": _told(rows[EVENNESS].get(part.label), EVENNESS, "deg", (printed, part)),
+        }
+        told |= {"own": own, "other": other, "p": p_value}
         hearing = judge.on("operators_improve", who=who, without=part.label)
         claims.append(hearing.own(told, printed.done, improves(says)))
     return claims
@@ -195,48 +124,79 @@ def _told(
     return f"{name}: {medians}difference of medians {difference}{shown}, {told}"
 
 
-def extensions(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
-    """Judge section 5's claims of extension: static obstacles, more than two arms."""
-    problem, unit = condition.problem(Problem), condition.length_unit
-    arms, kinds = problem.assembly.num_arms, measures.kinds_of_pairs(condition)
-    found = []
-    if measures.TO_OBSTACLES in kinds:
+def evolution(results: Results, own_judge: Judge, condition: ConditionResults, who: str) -> Claim:
+    """Judge what evolution adds to every control of a condition."""
+    beside = [
+        c
+        for c in results.evolved
+        if c.is_control and comparisons.beside(condition.condition, c.condition)
+    ]
+    return evolution_adds(own_judge, condition, beside, who)
+
+
+def evolution_adds(
+    judge: Judge, condition: ConditionResults, controls: Controls, who: str = ""
+) -> Claim:
+    """Judge what evolution adds to each control, that of the lowest median cost first."""
+    pairs = [(condition, control) for control in controls if control.done]
+    rows = {row.quantity: row for row in comparisons.compared(pairs, BEST, judge.settings)}
+    shown = [control for control in controls if control.label in rows]
+    shown.sort(key=lambda control: float(np.median(BEST(control))))
+    fitness = " · ".join(
+        f"{c.label} {markdown.spread(c.spread('term_fitness'))}" for c in (condition, *shown)
+    )
+    straight = condition.evaluate(measures.straight_line(condition))["fitness"]
+    told = [f"fitness F: {fitness} · straight line {markdown.number(straight)}"]
+    for place, control in enumerate(shown):
+        row = rows[control.label]
+        which = f"the best control, {control.label}" if place == 0 else control.label
+        told.append(
+            f"to {which}, evolution adds {markdown.number(-row.median_difference)} to the median: "
+            f"its best cost is {judging.evidence(row, 'lower')}"
+        )
+    if not shown:
+        told.append("no control beside it")
+    compared = [rows[control.label] for control in shown]
+    return judge.on("evolution_adds", who=who).better_than_all("; ".join(told), compared)
+
+
+def extensions(condition: ConditionResults) -> list[str]:
+    """Return section 5's claims of extension: to static obstacles, to more than two arms."""
+    arms, found = condition.problem(Problem).assembly.num_arms, []
+    if measures.TO_OBSTACLES in measures.kinds_of_pairs(condition):
         found.append("The algorithm can easily be extended to static obstacles")
     if arms > 2:
         found.append(f"The algorithm plans for any multi-arm system, here for {arms} arms")
-    exact, verdicts = measures.approaches(condition), condition.verdicts
-    told = [
+    return found
+
+
+def least_distances(condition: ConditionResults) -> str:
+    """Return the least distance of each kind of pairs, and in how many motions it is enough."""
+    exact, unit = measures.approaches(condition), condition.length_unit
+    return ", ".join(
         f"{kind} {markdown.number(float(own['clearance'].min()))} {unit} at least (required "
         f"{margin:g}, kept in {markdown.share(int(own['kept'].sum()), len(own))})"
-        for kind, (_, margin) in kinds.items()
+        for kind, (_, margin) in measures.kinds_of_pairs(condition).items()
         for own in (exact[exact["kind"] == kind],)
-    ]
-    for name in found:
-        for rule, evidence, holds in (
-            ("extends_at_via_points", "finished runs", condition.solved),
-            ("extends_whole_motion", "motions certified", verdicts.certified),
-            ("extends_with_margin", f"motions keep them; {', '.join(told)}", verdicts.with_margin),
-        ):
-            text = f"{markdown.share(holds, condition.done)} {evidence}"
-            hearing = judge.on(rule, extension=name)
-            yield hearing.majority(text, holds, condition.done)
-
-
-def collision_weight(judge: Judge, first: ConditionResults) -> list[Claim]:
-    """Judge that collisions are avoided at all costs, with the weight k3 as printed."""
-    straight, worth = measures.straight_length(first), measures.worth(first)
-    hits = first.evaluate(measures.straight_line(first))["collisions"]
-    told = f"{markdown.share(first.solved, first.done)} finished runs end free at via-points"
-    done, planned, share = first.done, first.planned, worth / straight
-    evidence = (
-        f"one colliding instant costs as much as {markdown.number(worth)}° of path, "
-        f"{100 * share:.1f} % of the straight paths' {markdown.number(straight)}°; the straight "
-        f"line collides at {hits:.0f} instants, the best strings are longer by "
-        f"{markdown.number(float(np.median(measures.length(first))) - straight)}° in the median"
     )
-    outweighs = judge.on("collisions_outweigh_paths")
-    least = outweighs.rule.limits["share"]
-    return [
-        judge.on("collisions_avoided").every(told, first.solved, done, planned),
-        outweighs.own(evidence, done, True if share >= 1.0 else False if share < least else None),
-    ]
+
+
+def outweighs(share_of_path: float, rules: Rules) -> bool | None:
+    """Return whether no shorter path outweighs a collision; None: nobody can say."""
+    least = rules["collisions_outweigh_paths"].limits["share"]
+    return True if share_of_path >= 1.0 else False if share_of_path < least else None
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "safe_at": lambda condition, margin: condition.column(AT) >= margin,
+    "safe_between": lambda condition, margin: condition.column(BETWEEN) >= margin,
+    "least_share_at": lambda condition, margin: condition.column(AT).min() / margin,
+    "certified_of_all": lambda condition: Proportion(condition.verdicts.certified, condition.done),
+    "margin_of_all": lambda condition: Proportion(condition.verdicts.with_margin, condition.done),
+    # a colliding instant costs so many straight paths of all arms together
+    "share_of_path": lambda worth, straight_length: worth / straight_length,
+    "percent_of_path": lambda share_of_path: 100.0 * share_of_path,
+    "median_longer": lambda condition: float(
+        np.median(measures.length(condition)) - measures.straight_length(condition)
+    ),
+}

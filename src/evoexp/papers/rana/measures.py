@@ -17,9 +17,8 @@ from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.run_measures import grouped, summed
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons
-from evoexp.report.statistics.comparisons import Comparison, FamilyComparison
+from evoexp.report.statistics.comparisons import FamilyComparison
 from evoexp.report.statistics.inference import Proportion
-from evoexp.report.statistics.judging import Judge, evidence
 
 UNEVENNESS = "term_unevenness_arm_"
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
@@ -29,7 +28,6 @@ GENERATIONS = (0, 10, 50)  # whose pairs of strings are looked at
 PAIRS = 2000  # drawn of each generation
 BETWEEN_ARMS, TO_OBSTACLES = "between arms", "to obstacles"  # kinds of pairs of bodies
 STRAIGHT = "straight line"
-COST = comparisons.by_column("best_cost")
 
 
 # C3 + C4 + … of each run's best: sums of |step − mean step| (Eqs. 4, 5), (done,) [deg]
@@ -114,34 +112,6 @@ def colliding_after(condition: ConditionResults, relaxed: bool) -> int:
     rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
     improved = operator.improve(found, np.stack(strings, axis=2), rng)
     return int(np.count_nonzero(~own.cost(found, improved).feasible))
-
-
-def evolution_told(
-    judge: Judge, condition: ConditionResults, controls: Sequence[ConditionResults]
-) -> tuple[str, list[Comparison]]:
-    """Return the evidence on what evolution adds to each control, and the comparisons of costs.
-
-    The control of the lowest median cost comes first.
-    """
-    pairs = [(condition, control) for control in controls if control.done]
-    rows = {row.quantity: row for row in comparisons.compared(pairs, COST, judge.settings)}
-    shown = [control for control in controls if control.label in rows]
-    shown.sort(key=lambda control: float(np.median(COST(control))))
-    fitness = " · ".join(
-        f"{c.label} {markdown.spread(c.spread('term_fitness'))}" for c in (condition, *shown)
-    )
-    straight = condition.evaluate(straight_line(condition))["fitness"]
-    told = [f"fitness F: {fitness} · straight line {markdown.number(straight)}"]
-    for place, control in enumerate(shown):
-        row = rows[control.label]
-        which = f"the best control, {control.label}" if place == 0 else control.label
-        told.append(
-            f"to {which}, evolution adds {markdown.number(-row.median_difference)} to the median: "
-            f"its best cost is {evidence(row, 'lower')}"
-        )
-    if not shown:
-        told.append("no control beside it")
-    return "; ".join(told), [rows[control.label] for control in shown]
 
 
 def fits(results: Results) -> bool:

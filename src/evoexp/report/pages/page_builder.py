@@ -27,6 +27,7 @@ from evoexp.report.statistics.comparisons import (
     FamilyComparison,
     Measure,
     compare_families,
+    compared,
     compared_with_controls,
     headed,
 )
@@ -74,7 +75,7 @@ def build(
         other = entry.get("otherwise", GENERIC)
         return build(own_pages() if other == GENERIC else file, other, results, settings)
     if "headlines" not in entry:
-        return PageBuilder(file, scope.inner(compared=_compared(scope, entry))).page(entry)
+        return PageBuilder(file, scope.inner(compared=family_comparisons(scope, entry))).page(entry)
     return own_page(
         "readings",
         results,
@@ -118,16 +119,17 @@ class PageBuilder:
                     unit = self.scope["unit"] if unit == LENGTH else unit
                     yield quantity(results, self.scope.text(title), unit, self.scope[values])
 
-    def claims(self, entries: Sequence[str | Entry]) -> Iterator[Claim]:
+    def claims(self, entries: Sequence[str | Entry], scope: Scope | None = None) -> Iterator[Claim]:
         """Yield claims, judged one after the other, or several of each item."""
         for entry in entries:
-            each: Entry = {"judge": [entry]} if isinstance(entry, str) else entry
-            for scope in self.items(each):
-                if "claim" in each:
-                    yield from judged_as_written(scope, each)
-                for name in each.get("judge", ()):
-                    judged = scope[name]
-                    yield from [judged] if isinstance(judged, Claim) else judged or ()
+            if isinstance(entry, str):
+                judged = (self.scope if scope is None else scope)[entry]
+                yield from [judged] if isinstance(judged, Claim) else judged or ()
+            elif "claim" in entry:
+                yield from judged_as_written(self.items(entry, scope), entry)
+            else:
+                for inner in self.items(entry, scope):
+                    yield from self.claims(entry["judge"], inner)
 
     def tables(self, names: Sequence[str]) -> Iterator[Table]:
         """Yield the tables that have rows."""
@@ -167,14 +169,22 @@ class PageBuilder:
 
     def comparisons(self, entry: Entry) -> Iterator[tuple[str, tuple[Comparison, ...]]]:
         """Yield (heading, comparisons)."""
+        results, settings = self.scope["results"], self.scope["settings"]
         for each in entry.get("comparisons", ()):
             if isinstance(each, str):
                 yield from self.scope[each]
             elif "controls" in each:
                 own = [measure(self.scope, *row) for row in each["controls"]]
-                yield from compared_with_controls(
-                    self.scope["results"], self.scope["settings"], own
-                )
+                yield from compared_with_controls(results, settings, own)
+            elif "pairs" in each:
+                by_label = {c.label: c for c in results.with_data}
+                known = [pair for pair in self.scope[each["pairs"]] if by_label.keys() >= {*pair}]
+                pairs = [(by_label[one], by_label[two]) for one, two in known]
+                for row in each["measures"] if pairs else ():
+                    of = measure(self.scope, *row)
+                    lower, named = of.lower_is_better, "{0.label} against {1.label}".format
+                    rows = compared(pairs, of.values, settings, lower_is_better=lower, named=named)
+                    yield f"{of.name}: {each['heading']}", rows
         yield from headed(self.scope["compared"])
 
     def items(self, entry: Entry, scope: Scope | None = None) -> Iterator[Scope]:
@@ -190,7 +200,7 @@ class PageBuilder:
                 for name, value in zip(names, item if len(names) > 1 else (item,), strict=True):
                     inner = inner.inner(**{name: value})
                 scopes.append(inner)
-        return (each for each in scopes if "when" not in entry or each.holds(entry["when"]))
+        return (each for each in scopes if _is_shown(each, entry))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""
@@ -257,6 +267,10 @@ class PageBuilder:
         )
 
 
+def _is_shown(scope: Scope, entry: Entry) -> bool:
+    return "when" not in entry or scope.holds(entry["when"])
+
+
 def _argument(scope: Scope, value: Any) -> Any:
     """Return an argument: the value of a name, functions by their texts, or a number itself."""
     if isinstance(value, Mapping):
@@ -271,7 +285,7 @@ def measure(
     return Measure(scope.text(name), scope[values], unit, better == "lower")
 
 
-def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
+def family_comparisons(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
     """Return the comparisons of families that a page asks for, which functions name `compared`."""
     found: list[FamilyComparison] = []
     for entry in page.get("comparisons", ()):
@@ -286,9 +300,10 @@ def _headline(scope: Scope, entry: Entry) -> Headline:
     """Return a headline claim of a paper, which a function judges on one condition."""
 
     def judged(condition: Any, controls: Any) -> Claim | None:
-        function = scope.functions[entry["judge"]]
-        return cast(
-            "Claim | None", scope.inner(condition=condition, controls=controls).call(function)
-        )
+        inner, judge = scope.inner(condition=condition, controls=controls), entry["judge"]
+        if isinstance(judge, Mapping):
+            shown = [inner] if _is_shown(inner, judge) else []
+            return next(judged_as_written(shown, {"claim": entry["claim"], **judge}), None)
+        return cast("Claim | None", inner.call(scope.functions[judge]))
 
     return Headline(entry["claim"], scope.text(entry["quantity"]), scope[entry["values"]], judged)

@@ -22,12 +22,15 @@ from evoexp.report.statistics.claim_rules import NO_RULES, Rules, read_rules
 
 FIGURES = "evoexp.report.figures"  # those that papers share
 FILE, RULES_FILE = "page.yaml", "claims.yaml"
+_CLAIM = {"each", "when", "claim", "of", "than", "values", "better", "word", "words", "family"}
+_CLAIM |= {"elsewhere", "unjudged", "n", "planned", "by", "evidence"}
 KEYS: dict[str, set[str]] = {
     "file": {"name", "functions", "pages", "quantities", "tables", "checks", "figures"},
     "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
     | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
-    "claims": {"each", "when", "judge", "claim", "of", "than", "values", "better", "word", "words"},
-    "comparisons": {"families", "measures", "controls"},
+    "claims": _CLAIM | {"judge"},
+    "judge": _CLAIM | {"judge"},
+    "comparisons": {"families", "measures", "controls", "pairs", "heading"},
     "headlines": {"claim", "quantity", "values", "judge"},
     "tables": {"heading", "headers", "behind", "each", "when", "cells", "row", "rows"} | {"note"},
     "checks": {"title", "finding", "each", "when", "rows"},
@@ -40,7 +43,7 @@ _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
 _FIRST = re.compile(r"[.\[]")  # ends the first part of a name
 _NAMED = (
     *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
-    *("plays", "shows"),
+    *("plays", "shows", "n", "planned", "by", "pairs"),
 )
 _TEXTS = ("title", "introduction", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (
@@ -176,7 +179,7 @@ def _mappings(path: str, entry: Any, kind: str) -> Iterator[tuple[str, Mapping[s
     elif isinstance(entry, Mapping):
         _check_keys(path, entry, kind)
         yield path, entry
-        for part in ("claims", "comparisons", "headlines", "finding"):
+        for part in ("claims", "comparisons", "headlines", "judge", "finding"):
             yield from _mappings(f"{path}.{part}", entry.get(part), part)
 
 

@@ -161,15 +161,10 @@ def nodes_table(condition: ConditionResults) -> pd.DataFrame:
 def wave_front(judge: Judge, field: str, nodes: pd.DataFrame) -> Claim:
     """Judge that a field is printed as the wave front computes it."""
     total = int((nodes["slip"] != SURPLUS).sum())
-    same, wrong, missing, surplus = (
-        int((nodes["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
-    )
-    evidence = (
-        f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left out, "
-        f"{surplus} tokens too many"
-    )
+    told = {slip or "same": int((nodes["slip"] == slip).sum()) for slip in ("", *MARKED_SLIPS)}
     hearing = judge.on("wave_front", part=field)
-    return hearing.own(evidence, f"{total} nodes", same >= hearing.rule.limits["share"] * total)
+    holds = told["same"] >= hearing.rule.limits["share"] * total
+    return hearing.own(told | {"total": total}, f"{total} nodes", holds)
 
 
 def slips(nodes: pd.DataFrame) -> str:

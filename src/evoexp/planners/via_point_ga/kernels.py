@@ -29,7 +29,8 @@ class Settings(NamedTuple):
     relaxation_step: float  # delta of Eqs. 8, 9
     substeps: int  # configurations tested per segment
     weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7
-    tables: Any  # `CircleTables` of the collision model; not read where bodies are covered
+    tables: Any  # `CircleTables` of the collision model
+    limits: FloatArray  # (nq, 2) of the joints, infinite where bodies are not covered [deg]
 
 
 class Population(NamedTuple):
@@ -123,13 +124,22 @@ def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray
 
 @kernel
 def smooth(strings: FloatArray, count: int, settings: Settings) -> None:
-    """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c)."""
+    """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c).
+
+    Points that leave the limits are put there.
+    """
     lanes = -(-count // 8) * 8  # whole vectors
     if settings.redistribution and count > 0 and strings.shape[1] > 2:
         arms, samples = settings.arm_slices, settings.samples
         redistribute_arms(strings, arms, lanes, samples, settings.is_clamped)
     if settings.relaxation_step > 0.0 and count > 0:
         relax_points(strings, settings.relaxation_step, lanes)
+    for joint in range(len(strings)):
+        low, high = settings.limits[joint]
+        for point in range(strings.shape[1]):
+            row = strings[joint, point]
+            for k in range(count):
+                row[k] = low if row[k] < low else (high if row[k] > high else row[k])
 
 
 @kernel

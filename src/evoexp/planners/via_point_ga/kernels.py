@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.collision.bodies.planar_contacts import contacts
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, follow_rows
 from evoexp.numeric.compilation import borrowed, kernel
@@ -64,7 +64,7 @@ def evolve(
     # see `Population`: some generations; number g is at place g modulo the number of places
     table: Population,
     scratch: Scratch,
-    summaries: FloatArray,  # (places, 4) written, see `summarise_strings`
+    summaries: FloatArray,  # (places, 4) written, see `summarise`
 ) -> None:
     """Go on from one generation to others."""
     rules, settings, scratch = borrowed((rules, settings, scratch))
@@ -88,7 +88,7 @@ def evolve(
         judge(offspring, settings, scratch.terms)
         following = Population(strings[other], costs[other], collisions[other])
         follow(Population(strings[own], costs[own], collisions[own]), scratch, following)
-        summarise_strings(costs[other], collisions[other], summaries[other])
+        summarise(costs[other], collisions[other] == 0.0, summaries[other])
 
 
 @kernel
@@ -110,16 +110,6 @@ def follow(population: Population, scratch: Scratch, following: Population) -> N
     ):
         one = before.reshape((1, -1))
         follow_rows(one, new.reshape((1, -1)), count, elites, after.reshape((1, -1)))
-
-
-@kernel
-def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray) -> None:
-    """Write index of the best, mean and deviation of the costs, number of free individuals."""
-    out[0], out[1], out[2] = cost_statistics(costs)
-    free = 0
-    for k in range(len(collisions)):
-        free += collisions[k] == 0.0
-    out[3] = free
 
 
 @kernel

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
@@ -203,8 +204,8 @@ class Search(GeneticSearch):
         return self._shown
 
     def _summarise(self, place: int) -> None:
-        costs, collisions = self.costs[place], self.table.collisions[place]
-        kernels.summarise_strings(costs, collisions, self.summaries[place])
+        free = self.table.collisions[place] == 0.0
+        summarise(self.costs[place], free, self.summaries[place])
 
 
 class ProvenSearch(Search):

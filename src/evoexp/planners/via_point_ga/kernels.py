@@ -10,7 +10,7 @@ import numpy as np
 from evoexp.collision.bodies.planar_contacts import contacts
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.succession import choose_elites, follow_rows
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
@@ -86,8 +86,7 @@ def evolve(
         smooth(offspring, count, settings)
         # Eqs. 2–7
         judge(offspring, settings, scratch.terms)
-        following = Population(strings[other], costs[other], collisions[other])
-        follow(Population(strings[own], costs[own], collisions[own]), scratch, following)
+        follow(table, own, other, scratch)
         summarise(costs[other], collisions[other] == 0.0, summaries[other])
 
 
@@ -98,18 +97,16 @@ def by_gene(strings: FloatArray) -> FloatArray:
 
 
 @kernel
-def follow(population: Population, scratch: Scratch, following: Population) -> None:
-    """Write the population that follows another: elites are not evaluated again."""
-    offspring, terms, elites, parents = scratch
-    count = len(parents)
-    strings, written = by_gene(population.strings), by_gene(following.strings)
-    follow_rows(strings, by_gene(offspring), count, elites, written)
-    for before, new, after in (
-        (population.costs, terms.cost, following.costs),
-        (population.collisions, terms.collisions, following.collisions),
-    ):
-        one = before.reshape((1, -1))
-        follow_rows(one, new.reshape((1, -1)), count, elites, after.reshape((1, -1)))
+def follow(table: Population, own: int, other: int, scratch: Scratch) -> None:
+    """Write the population at a place that follows another: elites are not evaluated again."""
+    (strings, costs, collisions), (offspring, terms, elites, parents) = table, scratch
+    count, new, following = len(parents), by_gene(offspring), by_gene(strings[other])
+    for row in range(len(new)):
+        for k in range(count):
+            following[row, k] = new[row, k]
+    copy_members(by_gene(strings[own]), elites, following, count)
+    costs[other, :count], collisions[other, :count] = terms.cost[:count], terms.collisions[:count]
+    costs[other, count:], collisions[other, count:] = costs[own][elites], collisions[own][elites]
 
 
 @kernel

@@ -145,7 +145,6 @@ def judge(strings: FloatArray, settings: Settings, terms: StringTerms) -> None:
         interpolate(strings, substeps, configurations)
     hits = np.empty((num_points - 1) * substeps * lanes)
     contacts(settings.tables, configurations.reshape((nq, -1)), start, hits)
-    by_instant = hits.reshape((1, num_points - 1, substeps, lanes))
-    count_collisions(by_instant, terms.collisions)
+    count_collisions(hits.reshape((num_points - 1, substeps, lanes)), terms.collisions)
     # Eq. 7
     weigh(settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

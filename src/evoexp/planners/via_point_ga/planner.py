@@ -48,7 +48,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
         kind = ProvenSearch if self.answers_are_proven else Search
-        return kind(self, problem, Strings(self, problem)).blocks(rng)
+        return kind(self, problem).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""

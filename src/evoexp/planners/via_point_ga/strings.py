@@ -90,15 +90,6 @@ class Strings:
         )
 
     @property
-    def generations_per_call(self) -> int:
-        """Generations that are best computed at once."""
-        if self.is_covered:  # whose tests take far longer than a call
-            return 1
-        return generations_per_call(
-            PER_CALL, self.empty(self.planner.ga.population_size).nbytes, CACHED
-        )
-
-    @property
     def genome(self) -> Genome:
         """The coordinates of via-points as operators see them; the ends of a string are fixed."""
         problem, shape = self.problem, (len(self.problem.start), self.planner.num_via_points + 1)
@@ -141,12 +132,6 @@ class Strings:
         named["collisions"] = collisions
         return JudgementArrays(terms.cost, collisions == 0.0, tested, named)
 
-    def table(self, places: int) -> kernels.Population:
-        """Return memory for the populations of some generations; the padding holds zeros."""
-        size = self.planner.ga.population_size
-        costs, collisions = np.empty((2, places, size))
-        return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
-
     def no_terms(self, strings: FloatArray, count: int) -> StringTerms:
         """Return memory for the terms of the first `count` strings; all but costs are padded."""
         lengths, unevenness = np.empty((2, len(self.problem.arm_slices), strings.shape[2]))
@@ -156,18 +141,17 @@ class Strings:
 class Search(GeneticSearch):
     """One run, and memory for its generations."""
 
-    def __init__(
-        self,
-        planner: "ViaPointGa",
-        problem: Problem,
-        strings: Strings,  # the planner's steps on this problem
-        per_call: int | None = None,  # generations computed at once; None: as many as is best
-    ) -> None:
+    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
         """Begin a run."""
-        ga, operators = planner.ga, planner.operators
-        super().__init__(ga, operators, strings.genome, per_call or strings.generations_per_call)
+        ga, strings = planner.ga, Strings(planner, problem)
+        population, offspring = strings.empty(ga.population_size), strings.empty(ga.num_offspring)
+        # testing covered bodies takes far longer than a call
+        one_by_one = planner.answers_are_proven or strings.is_covered
+        per_call = generations_per_call(1 if one_by_one else PER_CALL, population.nbytes, CACHED)
+        super().__init__(ga, planner.operators, strings.genome, per_call)
         self._planner, self._problem, self._strings = planner, problem, strings
-        self.table, offspring = strings.table(self.num_places), strings.empty(ga.num_offspring)
+        costs, collisions = np.empty((2, self.num_places, ga.population_size))
+        self.table = kernels.Population(np.array([population] * self.num_places), costs, collisions)
         terms = strings.no_terms(offspring, ga.num_offspring)
         self.scratch = kernels.Scratch(offspring, terms, self.elites, self.parents)
         self.costs, self._shown = self.table.costs, np.empty(self.table.strings.shape[1:])
@@ -211,9 +195,9 @@ class Search(GeneticSearch):
 class ProvenSearch(Search):
     """A run whose best string is proven: what is refuted costs more in the next generation."""
 
-    def __init__(self, planner: "ViaPointGa", problem: Problem, strings: Strings) -> None:
+    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
         """Begin a run, see `Search`, without any verdict."""
-        super().__init__(planner, problem, strings, per_call=1)
+        super().__init__(planner, problem)
         self._proofs = Proofs(planner, problem)
 
     def improve(self, places: IntArray) -> list[Best]:

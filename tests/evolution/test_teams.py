@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.evolution.best_team import best_team
-from evoexp.evolution.hall_of_fame import Hall, gather_teams
+from evoexp.evolution.hall_of_fame import gather_teams, rate_team
 from references.curkovic_numpy import Judged, formed
 
 NOTHING: Any = None
@@ -35,12 +35,12 @@ def collisions_of(judged: Judged) -> np.ndarray:
 def test_teams_are_formed_as_defined(seed: int, num: int, size: int, ties: bool) -> None:
     judged = world(seed, num, size, 0.4, ties)
     front = np.random.default_rng(seed).random((num, size)) < 0.4
-    teams = Hall.room(int(front.sum()), num)
-    assert gather_teams(collisions_of(judged), judged.own, front, teams) == len(teams.teams)
+    teams = np.empty((int(front.sum()), num), dtype=np.int64)
+    assert gather_teams(collisions_of(judged), judged.own, front, teams) == len(teams)
     expected = [formed(judged, r, i) for r, i in np.argwhere(front).tolist()]
-    assert [tuple(team) for team in teams.teams] == expected
-    keys = [judged.key(team) for team in expected]
-    assert list(zip(teams.collisions, teams.costs, strict=True)) == keys
+    assert [tuple(team) for team in teams] == expected
+    for team in teams:
+        assert rate_team(collisions_of(judged), judged.own, team) == judged.key(tuple(team))
 
 
 @given(st.integers(0, 10_000), st.sampled_from([2, 3, 4]), st.integers(1, 5), st.booleans())

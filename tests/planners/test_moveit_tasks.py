@@ -92,7 +92,7 @@ def test_pairs_that_may_touch_are_not_judged(tmp_path: Path) -> None:
 def test_covered_paths_agree_with_exact_bodies_and_keep_limits(tmp_path: Path) -> None:
     found = condition(tmp_path, "budget=paper", *SMALL)
     planner, problem = found.prepare()
-    low, high = Strings(planner, problem).limits
+    low, high = Strings(planner, problem).settings.limits.T
     assert low.max() < high.min()
     *_, last = generations(planner.evolve(problem, found.rng(0)))
     assert last.solved

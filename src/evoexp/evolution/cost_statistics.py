@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
 
 
 class CostStatistics(NamedTuple):
@@ -36,3 +36,10 @@ def cost_statistics(costs: FloatArray) -> CostStatistics:
         if np.isfinite(costs[k]):
             squares += (costs[k] - mean) * (costs[k] - mean)
     return CostStatistics(best, mean, np.sqrt(squares / count))
+
+
+@kernel
+def summarise(costs: FloatArray, feasible: BoolArray, out: FloatArray) -> None:
+    """Write index of the best, mean and deviation of the costs, and how many are feasible (4,)."""
+    out[0], out[1], out[2] = cost_statistics(costs)
+    out[3] = np.count_nonzero(feasible)

@@ -23,15 +23,12 @@ class Hall(NamedTuple):
 
     teams: IntArray  # (teams, P) index of the member in each population
     ages: IntArray  # (teams,) generations since each team entered
-    collisions: IntArray  # (teams,) colliding configurations within each team
-    costs: FloatArray  # (teams,) sum of the members' own costs
 
     @classmethod
     def room(cls, depth: int, num_populations: int) -> Self:
         """Return memory for `depth` teams."""
-        ages, collisions = np.empty((2, depth), dtype=np.int64)
         teams = np.empty((depth, num_populations), dtype=np.int64)
-        return cls(teams, ages, collisions, np.empty(depth))
+        return cls(teams, np.empty(depth, dtype=np.int64))
 
 
 class HallRules(NamedTuple):
@@ -85,9 +82,9 @@ def gather_teams(
     collisions: CollisionCounts,  # (pairs, N, N)
     own: FloatArray,  # (P, N)
     front: BoolArray,  # (P, N) the non-dominated individuals
-    # with room for a team per member of a front; written in the order of the members that teams
-    # were formed around: population by population, index by index
-    formed: Hall,
+    # (≥ members of the fronts, P) written in the order of the members that teams were formed
+    # around: population by population, index by index
+    teams: IntArray,
 ) -> int:
     """Give every member of a front its best collaborators; return how many teams there are.
 
@@ -100,12 +97,11 @@ def gather_teams(
         for i in range(count):
             if not front[p, i]:
                 continue
-            team = formed.teams[filled]
+            team = teams[filled]
             team[p] = i
             for other in range(num):
                 if other != p:
                     team[other] = choose_collaborator(collisions, team, p, other, order[other])
-            formed.collisions[filled], formed.costs[filled] = rate_team(collisions, own, team)
             filled += 1
     return filled
 
@@ -135,17 +131,15 @@ def renew_hall(
     hits, costs = np.empty(most, dtype=np.int64), np.empty(most)
     for k in range(num_teams):
         pool[k], ages[k] = hall.teams[k], hall.ages[k] + 1
-        hits[k], costs[k] = rate_team(collisions, own, pool[k])
         if rules.frozen:
             ranks[k] = k - num_teams  # before all new ones, in the order they have
         elif 0 < rules.memory < ages[k]:
             ranks[k] = 1  # behind all new ones
-    first = num_teams
-    new = Hall(pool[first:], ages[first:], hits[first:], costs[first:])
-    gather_teams(collisions, own, front, new)
+    gather_teams(collisions, own, front, pool[num_teams:])
     if best[0] >= 0:
         pool[most - 1] = best
-        hits[most - 1], costs[most - 1] = rate_team(collisions, own, best)
+    for k in range(most):
+        hits[k], costs[k] = rate_team(collisions, own, pool[k])
     # those that can still be taken, in order: a team of the hall formed again is not new
     left, num_left = np.empty(most, dtype=np.int64), 0
     for k in range(most):
@@ -159,7 +153,6 @@ def renew_hall(
             if (ranks[k], hits[k], costs[k]) < (ranks[taken], hits[taken], costs[taken]):
                 taken = k
         hall.teams[held], hall.ages[held] = pool[taken], ages[taken]
-        hall.collisions[held], hall.costs[held] = hits[taken], costs[taken]
         num_left = drop_rivals(pool, hall.teams[held], rules.exclusive, left, num_left)
         held += 1
     return held

@@ -28,19 +28,3 @@ def copy_members(population: FloatArray, members: IntArray, out: FloatArray, fir
     for row in range(len(out)):
         for k in range(len(members)):
             out[row, first + k] = population[row, members[k]]
-
-
-@kernel
-def follow_rows(
-    population: FloatArray,  # (rows, individuals, padding allowed), which stays as it is
-    offspring: FloatArray,  # (rows, ≥ offspring)
-    num_offspring: int,
-    elites: IntArray,  # (elites,) indices into the population
-    following: FloatArray,  # like population, written
-) -> None:
-    """Write the population that follows another one: the offspring, then the elites in order."""
-    for row in range(len(population)):
-        new, written = offspring[row], following[row]
-        for k in range(num_offspring):
-            written[k] = new[k]
-    copy_members(population, elites, following, num_offspring)

@@ -66,17 +66,16 @@ def weigh(
 def count_collisions(clearance: FloatArray, collisions: FloatArray) -> None:
     """Count the instants at which each individual collides (Eq. 6), (lanes,).
 
-    Clearances are (kinds, instants, substeps, lanes): one negative one of an instant is enough.
+    Clearances are (instants, substeps, lanes): one negative one of an instant is enough.
     """
-    kinds, instants, substeps, lanes = clearance.shape
+    instants, substeps, lanes = clearance.shape
     hit = np.empty(lanes)
     collisions[:] = 0.0
     for i in range(instants):
         hit[:] = 0.0
         for s in range(substeps):
-            for kind in range(kinds):
-                row = clearance[kind, i, s]
-                for lane in range(lanes):
-                    hit[lane] = 1.0 if row[lane] < 0.0 else hit[lane]
+            row = clearance[i, s]
+            for lane in range(lanes):
+                hit[lane] = 1.0 if row[lane] < 0.0 else hit[lane]
         for lane in range(lanes):
             collisions[lane] += hit[lane]

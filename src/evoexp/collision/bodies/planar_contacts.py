@@ -73,8 +73,14 @@ class LinkLines(NamedTuple):
     scale: float
 
 
+NO_LINES = LinkLines(
+    np.empty(0, np.int64), np.empty((0, 7)), np.empty((0, 2), np.int64), np.empty(0), 0.0, np.inf
+)
+"""Nothing in equal steps: everything is left to `least_clearances`."""
+
+
 class CircleTables(NamedTuple):
-    """Tables of a robot of touching circles or spheres."""
+    """Tables of a robot of touching circles or spheres, or of covered bodies."""
 
     chain: KinematicChain  # the joints
     lines: LinkLines  # what this kernel reads

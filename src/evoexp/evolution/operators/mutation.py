@@ -43,12 +43,6 @@ def draw_amounts(num_genes: int, count: int, context: Context) -> FloatArray:
     return amounts
 
 
-@kernel
-def limits_of(gene: int, context: Context) -> tuple[float, float]:
-    """Return the least and the greatest value of a gene."""
-    return context.genome.limits[gene, 0], context.genome.limits[gene, 1]
-
-
 class NonUniformMutation(GeneMutation):
     """Moves a gene towards one of its limits, less and less far (Michalewicz 1992).
 
@@ -67,7 +61,7 @@ class NonUniformMutation(GeneMutation):
         spread = pow_int(1.0 - context.progress, int(context.settings[1]))
         amounts = draw_amounts(len(genomes), count, context)
         for gene in range(len(genomes)):
-            row, (low, high) = genomes[gene], limits_of(gene, context)
+            row, (low, high) = genomes[gene], context.genome.limits[gene]
             for k in range(count):
                 amount, x = amounts[gene, k], row[k]
                 up = x + (high - x) * (2.0 * amount) * spread
@@ -90,7 +84,7 @@ class GaussianMutation(GeneMutation):
         """Change offspring; see `Mutation`."""
         std, amounts = context.settings[1], draw_amounts(len(genomes), count, context)
         for gene in range(len(genomes)):
-            row, (low, high) = genomes[gene], limits_of(gene, context)
+            row, (low, high) = genomes[gene], context.genome.limits[gene]
             for k in range(count):
                 mutant = min(max(row[k] + std * (high - low) * context.normals[gene, k], low), high)
                 row[k] = mutant if amounts[gene, k] >= 0.0 else row[k]
@@ -107,7 +101,7 @@ class UniformReset(GeneMutation):
         """Change offspring; see `Mutation`."""
         amounts = draw_amounts(len(genomes), count, context)
         for gene in range(len(genomes)):
-            row, (low, high) = genomes[gene], limits_of(gene, context)
+            row, (low, high) = genomes[gene], context.genome.limits[gene]
             for k in range(count):
                 mutant = min(max(low + amounts[gene, k] * (high - low), low), high)
                 row[k] = mutant if amounts[gene, k] >= 0.0 else row[k]

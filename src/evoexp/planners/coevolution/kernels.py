@@ -114,6 +114,8 @@ class LineTask(NamedTuple):
     arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
     weights: tuple[float, float, float]  # of C2, C3, C4
     collision_weight: float  # of C1
+    half_width: float  # of the robots' envelopes, 0.0 of lines [length unit]
+    tcp_radius: float  # of the circles around their tips, 0.0: none
 
 
 @kernel
@@ -270,41 +272,38 @@ def measure(
             for k in range(1, last):
                 path[k, link] = genes[2 * (k - 1) + link]
         # where the links are (Eq. 11), then Eqs. 6–8
-        write_outlines(path, line_arm(task.arms, r), points[r])
+        write_outlines(path, arm_of(task, r), points[r])
         measure_motions(path, points[r], task.weights, criteria[r, 1:], own[r])
 
 
 @kernel
-def line_arm(arms: FloatArray, robot: int) -> Arm:
-    """Return a robot's arm without an envelope; arms as of `LineTask`."""
-    return Arm((arms[robot, 0], arms[robot, 1]), (arms[robot, 2], arms[robot, 3]), 0.0, 0.0)
+def arm_of(task: LineTask, robot: int) -> Arm:
+    """Return a robot's arm."""
+    x, y, first, second = task.arms[robot]
+    return Arm((x, y), (first, second), task.half_width, task.tcp_radius)
 
 
 @kernel
-def evaluate_lines(
-    populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
+def count_crossings(
+    outlines: FloatArray,  # (robots, configurations, 4 | 8, individuals) see `planar_arms`
+    untested: int,  # configurations at either end that are not tested
     task: LineTask,
-    found: Evaluated,  # written, all but `blocked`: there are no obstacles
+    found: Evaluated,  # `costs`, `collisions` and C1 are written
 ) -> bool:
-    """Evaluate everybody against everybody of the other robots, where robots are lines (Eq. 4).
+    """Count the collisions of everybody with everybody of the other robots (Eqs. 4, 5).
 
-    One call does what `Coevolution.evaluated` does step by step with other models. Returns False if
-    a coordinate is not finite.
+    Returns False if a coordinate is not finite.
     """
-    costs, criteria, own, collisions = found.costs, found.criteria, found.own, found.collisions
-    robots, genes, count = populations.shape
-    last = genes // 2 + 1
-    paths, points = np.empty((robots, last + 1, 2, count)), np.empty((robots, last + 1, 4, count))
-    # C2 … C4 (Eqs. 6–8)
-    measure(populations, task, paths, points, criteria, own)
-    # C1 (Eqs. 4, 5) at the configurations between start and goal
+    own, (robots, count) = found.own, found.own.shape
+    last = outlines.shape[1] - untested
     rows, columns = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
-    sums, pair = np.zeros((robots, count), dtype=np.int64), 0
+    sums, pair = found.blocked * count, 0  # an obstacle is in the way of every team
     for a in range(robots):
         for b in range(a + 1, robots):
-            one, two = line_arm(task.arms, a), line_arm(task.arms, b)
-            first, second, near = points[a][1:last], points[b][1:last], tolerance_of(one, two)
-            count_pairs(one, first, two, second, near, collisions[pair], rows, columns)
+            one, two = arm_of(task, a), arm_of(task, b)
+            first, second = outlines[a][untested:last], outlines[b][untested:last]
+            near, counts = tolerance_of(one, two), found.collisions[pair]
+            count_pairs(one, first, two, second, near, counts, rows, columns)
             for k in range(count):
                 sums[a, k] += rows[k]
                 sums[b, k] += columns[k]
@@ -313,8 +312,8 @@ def evaluate_lines(
         for k in range(count):
             if not abs(own[r, k]) < LARGEST:
                 return False
-            criteria[r, 0, k] = sums[r, k]
-            costs[r, k] = task.collision_weight * sums[r, k] + own[r, k]
+            found.criteria[r, 0, k] = sums[r, k]
+            found.costs[r, k] = task.collision_weight * sums[r, k] + own[r, k]
     return True
 
 

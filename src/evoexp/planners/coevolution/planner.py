@@ -11,12 +11,12 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations
 from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
 
+from evoexp.collision.planar.arm_pairs import MOST_CONFIGURATIONS
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
@@ -29,7 +29,7 @@ from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
     LineTask,
-    evaluate_lines,
+    count_crossings,
     measure,
 )
 from evoexp.planners.coevolution.settings import CoevolutionSettings, SpeedLimit, length_notes
@@ -40,7 +40,9 @@ from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
-NOT_FINITE = "points and bases must be finite and below 1e70"
+REFUSED = (
+    f"points and bases must be finite and below 1e70, at most {MOST_CONFIGURATIONS} configurations"
+)
 PAIR_BYTES = 7  # of a pair of individuals: collisions in two generations, whether they are a team
 
 
@@ -131,35 +133,28 @@ class Coevolution(PlannerDefaults, Component):
 
     def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
         """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
-        collision, objective = problem.collision, self.objective
-        robots, _, count = populations.shape
-        if collision.is_lines:
-            lined = Evaluated.room(robots, count)
-            if not evaluate_lines(populations, self.task(problem), lined):
-                raise ValueError(NOT_FINITE)
-            return lined
+        collision, (robots, _, count) = problem.collision, populations.shape
+        found, task = Evaluated.room(robots, count), self.task(problem)
         # paths, and C2 … C4 (Eqs. 6–8)
-        criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
-        paths = np.empty((robots, self.num_configurations + 2, 2, count))
-        points = np.empty((robots, self.num_configurations + 2, 4, count))
-        measure(populations, self.task(problem), paths, points, criteria, own)
-        # C1 (Eqs. 4, 5): an obstacle is in the way whoever the collaborator is
-        tested = [collision.tested(path) for path in paths]
-        blocked = np.array([collision.with_obstacles(r, tested[r]) for r in range(robots)])
-        hits, sums = [], blocked * count
-        for a, b in combinations(range(robots), 2):
-            crossings = collision.between(a, tested[a], b, tested[b])
-            hits.append(crossings.counts)
-            sums[a] += crossings.sums_1
-            sums[b] += crossings.sums_2
-        criteria[:, 0] = sums
-        costs = objective.collision_weight * sums + own
-        return Evaluated(costs, criteria, own, np.array(hits), blocked)
+        shape, is_lines = (robots, self.num_configurations + 2), collision.is_lines
+        paths, outlines = np.empty((*shape, 2, count)), np.empty((*shape, 4, count))
+        measure(populations, task, paths, outlines, found.criteria, found.own)
+        # C1 (Eqs. 4, 5)
+        if not is_lines:
+            tested = [collision.tested(path) for path in paths]
+            found.blocked[:] = [collision.with_obstacles(r, q) for r, q in enumerate(tested)]
+            arms = zip(collision.arms, tested, strict=True)
+            outlines = np.array([arm.outlines(q) for arm, q in arms])
+        fits = outlines.shape[1] <= MOST_CONFIGURATIONS
+        if not (fits and count_crossings(outlines, int(is_lines), task, found)):
+            raise ValueError(REFUSED)
+        return found
 
     def task(self, problem: Problem) -> LineTask:
         """Return the robots and the weights of their criteria, as kernels take them."""
         weights = self.objective.own_weights, self.objective.collision_weight
-        return LineTask(problem.start, problem.goal, problem.arms, *weights)
+        envelope = self.collision.half_width, self.collision.tcp_radius
+        return LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
@@ -93,8 +93,7 @@ def note(population: Population, place: int, recorded: Population, summaries: Fl
     """Write to a place the results of all paths, the best path alone, and the summary."""
     results, summary = population.results, summaries[place]
     recorded.results[place] = results
-    summary[0], summary[1], summary[2] = cost_statistics(results[COST])
-    summary[3] = results.shape[1]
+    summarise(results[COST], np.isfinite(results[COST]), summary)
     copy_path(population.paths[int(summary[0])], recorded.paths[place])
 
 

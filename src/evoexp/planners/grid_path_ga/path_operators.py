@@ -15,7 +15,6 @@ from evoexp.records import FloatArray, IntArray
 
 NOT_CONNECTED, CONNECTED = -1, -2
 PLACE_BITS = 32
-ONE = np.uint64(1)
 
 
 class World(NamedTuple):
@@ -92,26 +91,19 @@ def cross(
     """
     one, two = parents
     place, joined, sites, erase = scratch.place, scratch.joined, scratch.sites, breeding.erase
-    # at a common node
     count = coincident_sites(one, two, scratch.seen, sites)
-    if count > 0:
-        site = draw_index(draws, count)
-        if erase:
-            exchange_without_loops(one, two, sites[:count], site, children)
-        else:
-            i, j = places_of(sites[site])
-            _exchange(one, i, two, j, children[0], scratch)
-            _exchange(two, j, one, i, children[1], scratch)
-        return True
-    # at two near nodes
-    i, j = near_sites(draws, world.coordinates, one, two, breeding.reach)
-    if i == 0:
-        return False
-    link = connection(draws, world.neighbours, one[i], two[j])
-    if link == NOT_CONNECTED:
-        return False
-    settle(joined, _join(one, i, link, two, j, joined), erase, children[0], place)
-    settle(joined, _join(two, j, link, one, i, joined), erase, children[1], place)
+    if count > 0:  # at a common node, which stays once
+        i, j = places_of(sites[draw_index(draws, count)])
+        link, behind = CONNECTED, 1
+    else:  # at two near nodes
+        i, j = near_sites(draws, world.coordinates, one, two, breeding.reach)
+        if i == 0:
+            return False
+        link, behind = connection(draws, world.neighbours, one[i], two[j]), 0
+        if link == NOT_CONNECTED:
+            return False
+    settle(joined, _join(one, i, link, two, j + behind, joined), erase, children[0], place)
+    settle(joined, _join(two, j, link, one, i + behind, joined), erase, children[1], place)
     return True
 
 
@@ -119,54 +111,6 @@ def cross(
 def places_of(site: int) -> tuple[int, int]:
     """Return the places of a common node in the first path and in the second."""
     return site >> PLACE_BITS, site & (2**PLACE_BITS - 1)
-
-
-@kernel
-def exchange_without_loops(
-    one: NodeArray,
-    two: NodeArray,
-    sites: IntArray,
-    site: int,
-    children: tuple[NodeArray, NodeArray],
-) -> None:
-    """Exchange the remainders of two paths without loops at a site, and erase the loops.
-
-    Erasing them leaves the head up to the first node that the tail passes, too, and the tail from
-    there.
-    """
-    # the first node of the first path's head among those of the second one's tail
-    own = sites[site]
-    nearest = own
-    for k in range(site + 1, len(sites)):
-        nearest = min(nearest, sites[k])
-    i, j = places_of(nearest)
-    _splice(one, i, two, j, children[0])
-    # the first node of the second path's head among those of the first one's tail
-    first = np.uint64(0)
-    while sites[first] < own:
-        first += ONE
-    i, j = places_of(sites[first])
-    _splice(two, j, one, i, children[1])
-
-
-@kernel
-def _exchange(
-    head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray, scratch: Scratch
-) -> None:
-    """Write a path's head up to a place, and another's tail behind a place; erase loops if full."""
-    if i + tail[0] - j < len(child):
-        _splice(head, i, tail, j, child)
-    else:
-        count = _join(head, i, -1, tail, j + 1, scratch.joined)
-        settle(scratch.joined, count, False, child, scratch.place)
-
-
-@inlined
-def _splice(head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray) -> None:
-    """Write a path's head up to a place, and another's tail behind a place."""
-    copy_part(head, 1, child, 1, i)
-    copy_part(tail, j + 1, child, i + 1, tail[0] - j)
-    child[0] = tail[0] - j + i
 
 
 @kernel

@@ -6,7 +6,6 @@ An individual is two strings of bits, see `evolution.bit_coding`.
 from typing import NamedTuple
 
 from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import Block, draw_many, used_up
@@ -78,13 +77,3 @@ def judge(strings: IntArray, coding: Coding, model: Model, count: int, rows: Flo
     """Decode and measure the first individuals: fill their rows."""
     decode_strings(strings[:, :count], coding.bits, coding.gray, coding.limits, rows[:GENES])
     measure_postures(rows[:GENES], count, model, rows[GENES:])
-
-
-@kernel
-def summarise_rows(rows: FloatArray, summary: FloatArray) -> None:
-    """Write index of the best, mean and deviation of the costs, number of feasible postures."""
-    summary[0], summary[1], summary[2] = cost_statistics(rows[GENES + COST])
-    num_feasible = 0
-    for k in range(rows.shape[1]):
-        num_feasible += rows[ROWS - 1, k] >= 0.0
-    summary[3] = num_feasible

@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.placement_criteria import PlacementCriteria
@@ -185,7 +186,8 @@ class _Search(ScaledSearch):
 
     def note(self, population: Population, place: int) -> None:
         """Summarise a generation at a place."""
-        kernels.summarise_rows(population.rows, self.summaries[place])
+        rows = population.rows
+        summarise(rows[FIRST_CRITERION], rows[-1] >= 0.0, self.summaries[place])
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return angles, criteria and whether the posture is feasible."""

@@ -9,16 +9,7 @@ from pydantic import model_validator
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es import kernels
-from evoexp.planners.posture_es.kernels import (
-    COST,
-    EQUAL,
-    GAUSSIAN,
-    NORMAL,
-    UNIFORM,
-    Members,
-    Memory,
-    Strategy,
-)
+from evoexp.planners.posture_es.kernels import COST, Members, Memory, Strategy
 from evoexp.planners.posture_es.phases import Problem, Stage
 from evoexp.records import FloatArray, IntArray
 from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
@@ -94,9 +85,9 @@ class Search:
         self._strategy = Strategy(
             problem.scope * stage.phase.scope_share,
             problem.limits,
-            GAUSSIAN if ga.mutation == "gaussian" else UNIFORM,
+            ga.mutation == "gaussian",
             ga.mutation_std,
-            NORMAL if ga.parent_choice == "gaussian" else EQUAL,
+            ga.parent_choice == "gaussian",
             ga.parent_std,
             ga.crossover_rate,
             ga.selection == "plus",

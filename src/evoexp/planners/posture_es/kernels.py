@@ -30,8 +30,6 @@ from evoexp.robots.poses import frame_poses
 
 COST = len(TERMS)
 ROWS = COST + 1  # the terms, then the cost
-UNIFORM, GAUSSIAN = range(2)
-EQUAL, NORMAL = range(2)
 TURNS = (ANGLE, AXIAL, HEADING)  # terms that must be small, too, where a goal is met
 
 
@@ -60,9 +58,9 @@ class Strategy(NamedTuple):
 
     scope: FloatArray  # (nq,) greatest step of each joint [rad]
     limits: FloatArray  # (nq, 2) of the joints
-    mutation: int  # UNIFORM or GAUSSIAN
+    gaussian: bool  # whether steps are normal deviates, not uniform ones
     mutation_std: float  # in units of the scope [-]
-    parent_choice: int  # EQUAL or NORMAL
+    by_rank: bool  # whether better parents have more offspring
     parent_std: float  # in units of μ [-]
     crossover_rate: float  # probability per child
     plus: bool  # whether parents may stay
@@ -187,7 +185,7 @@ def breed(
     for n in range(num_bred):
         # parent: in turn, or by rank
         parent = n % num_parents
-        if strategy.parent_choice == NORMAL:
+        if strategy.by_rank:
             drawn = abs(normals[v]) * strategy.parent_std * num_parents
             parent = min(int(drawn), num_parents - 1)
             v += 1
@@ -204,7 +202,7 @@ def breed(
             u += 2 + nq
         # mutation
         for k in range(nq):
-            if strategy.mutation == GAUSSIAN:
+            if strategy.gaussian:
                 step = scope[k] * strategy.mutation_std * normals[v]
                 v += 1
             else:

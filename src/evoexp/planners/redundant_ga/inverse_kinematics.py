@@ -56,8 +56,7 @@ class DescendingSearch(DrawnSearch):
         bring_tips_to(ends, judging.target, limits, judging.arm)
         costs = kernels.judge_paths(self._sub_path.starts[:, :count].copy(), ends, judging)
         self._tables[place, :, :count] = np.concatenate([ends, costs])
-        kernels.summarise_costs(self.costs[place, 0], self.summaries[place])
-        self._prove(place)
+        self._summarise(place)
 
 
 class InverseKinematics(SequentialSearch):

@@ -17,7 +17,7 @@ from evoexp.collision.planar.ellipse_kernels import (
     prepare_checks,
 )
 from evoexp.evolution.bit_coding import decode_bits
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
@@ -71,7 +71,7 @@ def evolve(
     # (places, rows, individuals, filled up to whole vectors): generation g is at place g modulo the
     # number of places
     tables: FloatArray,
-    summaries: FloatArray,  # (places, 4) see `summarise_costs`
+    summaries: FloatArray,  # (places, 4) see `summarise`
 ) -> int:
     """Compute generations up to another, or the first that is good enough; return the last one."""
     uniforms, normals, rules, sub_path = borrowed((uniforms, normals, rules, sub_path))
@@ -93,7 +93,7 @@ def evolve(
             num_new = len(parents)
             draw(draws, num_new, sub_path, following, checks)
         new_costs = following[len(following) - RESULTS, :num_new]
-        summarise_costs(new_costs, summary)
+        summarise(new_costs, np.isfinite(new_costs), summary)
         if new_costs[int(summary[0])] < stop_cost:
             return t + 1
     return last
@@ -107,7 +107,8 @@ def begin(
     size = len(sub_path.hit)
     checks = prepare_checks(len(sub_path.starts), tables.shape[2])
     draw(uniforms, size, sub_path, tables[0], checks)
-    summarise_costs(tables[0, len(tables[0]) - RESULTS, :size], summaries[0])
+    costs = tables[0, len(tables[0]) - RESULTS, :size]
+    summarise(costs, np.isfinite(costs), summaries[0])
 
 
 @kernel
@@ -140,16 +141,6 @@ def _angles(table: FloatArray, count: int, sub_path: SubPath) -> FloatArray:
     if sub_path.binary:
         decode_bits(table[:num_genes], count, sub_path.limits, angles)
     return angles
-
-
-@kernel
-def summarise_costs(costs: FloatArray, out: FloatArray) -> None:
-    """Write index of the best, mean and deviation of the finite costs, and how many are finite."""
-    out[0], out[1], out[2] = cost_statistics(costs)
-    finite = 0
-    for k in range(len(costs)):
-        finite += np.isfinite(costs[k])
-    out[3] = finite
 
 
 @kernel

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
@@ -107,7 +108,7 @@ class Search(GeneticSearch):
         uniforms = rng.random(self._num_genes * self._ga.population_size)
         kernels.begin(uniforms, self._sub_path, self._tables, self.summaries)
         self.states = [state_bytes(rng.bit_generator)]
-        self._prove(0)
+        self._summarise(0)
 
     def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Compute generations, as far as the best end is not good enough."""
@@ -115,19 +116,17 @@ class Search(GeneticSearch):
         numbers = uniforms, normals, first, stop_cost, self.evolving
         rules = self.breeding, self._sub_path, self._tables, self.summaries
         reached = kernels.evolve(select, cross, mutate, *numbers, *rules)
-        self._prove(reached % self.num_places)
+        self._summarise(reached % self.num_places)
         return int(reached)
 
-    def _prove(self, place: int) -> None:
-        """Refute the ends of a generation that are not proven, where proofs are asked for."""
-        if self._proofs is None:
-            return
-        postures = self._postures
-        costs, ends = self.costs[place, 0], self._angles[place]
-        self._proofs.settle(
-            costs, lambda k: np.concatenate([*postures, *[ends[:, k]] * (3 - len(postures))])
-        )
-        kernels.summarise_costs(costs, self.summaries[place])
+    def _summarise(self, place: int) -> None:
+        """Summarise a generation; refute the ends that are not proven, if proofs are asked for."""
+        postures, costs, ends = self._postures, self.costs[place, 0], self._angles[place]
+        if self._proofs is not None:
+            self._proofs.settle(
+                costs, lambda k: np.concatenate([*postures, *[ends[:, k]] * (3 - len(postures))])
+            )
+        summarise(costs, np.isfinite(costs), self.summaries[place])
 
     def improve(self, places: IntArray) -> list[Best]:
         """Keep the best plan of the generations at some places; return the bests of their block."""

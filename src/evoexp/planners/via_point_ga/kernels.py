@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.collision.bodies.planar_contacts import contacts
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.succession import choose_elites, follow_rows
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
@@ -29,7 +29,8 @@ class Settings(NamedTuple):
     relaxation_step: float  # delta of Eqs. 8, 9
     substeps: int  # configurations tested per segment
     weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7
-    tables: Any  # `CircleTables` of the collision model; not read where bodies are covered
+    tables: Any  # `CircleTables` of the collision model
+    limits: FloatArray  # (nq, 2) of the joints, infinite where bodies are not covered [deg]
 
 
 class Population(NamedTuple):
@@ -63,7 +64,7 @@ def evolve(
     # see `Population`: some generations; number g is at place g modulo the number of places
     table: Population,
     scratch: Scratch,
-    summaries: FloatArray,  # (places, 4) written, see `summarise_strings`
+    summaries: FloatArray,  # (places, 4) written, see `summarise`
 ) -> None:
     """Go on from one generation to others."""
     rules, settings, scratch = borrowed((rules, settings, scratch))
@@ -85,9 +86,8 @@ def evolve(
         smooth(offspring, count, settings)
         # Eqs. 2–7
         judge(offspring, settings, scratch.terms)
-        following = Population(strings[other], costs[other], collisions[other])
-        follow(Population(strings[own], costs[own], collisions[own]), scratch, following)
-        summarise_strings(costs[other], collisions[other], summaries[other])
+        follow(table, own, other, scratch)
+        summarise(costs[other], collisions[other] == 0.0, summaries[other])
 
 
 @kernel
@@ -97,39 +97,36 @@ def by_gene(strings: FloatArray) -> FloatArray:
 
 
 @kernel
-def follow(population: Population, scratch: Scratch, following: Population) -> None:
-    """Write the population that follows another: elites are not evaluated again."""
-    offspring, terms, elites, parents = scratch
-    count = len(parents)
-    strings, written = by_gene(population.strings), by_gene(following.strings)
-    follow_rows(strings, by_gene(offspring), count, elites, written)
-    for before, new, after in (
-        (population.costs, terms.cost, following.costs),
-        (population.collisions, terms.collisions, following.collisions),
-    ):
-        one = before.reshape((1, -1))
-        follow_rows(one, new.reshape((1, -1)), count, elites, after.reshape((1, -1)))
-
-
-@kernel
-def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray) -> None:
-    """Write index of the best, mean and deviation of the costs, number of free individuals."""
-    out[0], out[1], out[2] = cost_statistics(costs)
-    free = 0
-    for k in range(len(collisions)):
-        free += collisions[k] == 0.0
-    out[3] = free
+def follow(table: Population, own: int, other: int, scratch: Scratch) -> None:
+    """Write the population at a place that follows another: elites are not evaluated again."""
+    (strings, costs, collisions), (offspring, terms, elites, parents) = table, scratch
+    count, new, following = len(parents), by_gene(offspring), by_gene(strings[other])
+    for row in range(len(new)):
+        for k in range(count):
+            following[row, k] = new[row, k]
+    copy_members(by_gene(strings[own]), elites, following, count)
+    costs[other, :count], collisions[other, :count] = terms.cost[:count], terms.collisions[:count]
+    costs[other, count:], collisions[other, count:] = costs[own][elites], collisions[own][elites]
 
 
 @kernel
 def smooth(strings: FloatArray, count: int, settings: Settings) -> None:
-    """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c)."""
+    """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c).
+
+    Points that leave the limits are put there.
+    """
     lanes = -(-count // 8) * 8  # whole vectors
     if settings.redistribution and count > 0 and strings.shape[1] > 2:
         arms, samples = settings.arm_slices, settings.samples
         redistribute_arms(strings, arms, lanes, samples, settings.is_clamped)
     if settings.relaxation_step > 0.0 and count > 0:
         relax_points(strings, settings.relaxation_step, lanes)
+    for joint in range(len(strings)):
+        low, high = settings.limits[joint]
+        for point in range(strings.shape[1]):
+            row = strings[joint, point]
+            for k in range(count):
+                row[k] = low if row[k] < low else (high if row[k] > high else row[k])
 
 
 @kernel
@@ -148,7 +145,6 @@ def judge(strings: FloatArray, settings: Settings, terms: StringTerms) -> None:
         interpolate(strings, substeps, configurations)
     hits = np.empty((num_points - 1) * substeps * lanes)
     contacts(settings.tables, configurations.reshape((nq, -1)), start, hits)
-    by_instant = hits.reshape((1, num_points - 1, substeps, lanes))
-    count_collisions(by_instant, terms.collisions)
+    count_collisions(hits.reshape((num_points - 1, substeps, lanes)), terms.collisions)
     # Eq. 7
     weigh(settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

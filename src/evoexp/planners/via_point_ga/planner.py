@@ -22,6 +22,7 @@ from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
 from evoexp.planners.planner import COPIES, JudgementArrays, num_values
 from evoexp.planners.proofs import Proofs
+from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import Problem, ProvenSearch, Search, Strings, settle
 from evoexp.records import Block, FloatArray
@@ -47,7 +48,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
         kind = ProvenSearch if self.answers_are_proven else Search
-        return kind(self, problem, Strings(self, problem)).blocks(rng)
+        return kind(self, problem).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
@@ -67,7 +68,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
     def bounds(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
         """Return the least and the greatest value of an individual's numbers, each (nq, N + 1)."""
         strings, shape = Strings(self, problem), (len(problem.start), self.num_via_points + 1)
-        low, high = (np.broadcast_to(limit[..., 0], shape) for limit in strings.limits)
+        low, high = (np.broadcast_to(limit[:, None], shape) for limit in strings.settings.limits.T)
         return low, high
 
     def improve(
@@ -79,7 +80,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
         """
         strings, count = Strings(self, problem), population.shape[2]
         improved = strings.padded(population)
-        strings.smooth(improved, count)
+        kernels.smooth(improved, count, strings.settings)
         return improved[:, :, :count]
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:

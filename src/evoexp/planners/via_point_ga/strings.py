@@ -1,7 +1,6 @@
 """Populations of strings of via-points: the problem they solve, their steps, and a run of them.
 
-Strings of robots whose bodies are covered keep within the joints' limits, and each step of their
-generations is a call of its own: testing covered bodies takes far longer than Python between them.
+Strings of robots whose bodies are covered keep within the joints' limits.
 """
 
 from typing import TYPE_CHECKING
@@ -11,13 +10,10 @@ import pinocchio as pin
 
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
-from evoexp.evolution.operators.breeding import breed
+from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.operator import Genome
-from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
-from evoexp.paths.interpolation import interpolate_linear
-from evoexp.paths.lengths import measure_paths
+from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.planners.answers import JudgementArrays
 from evoexp.planners.arm_tasks import ArmProblem
@@ -75,14 +71,11 @@ class Strings:
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         self.planner, self.problem = planner, problem
-        collision, most = problem.collision, np.full(len(problem.start), np.inf)
-        self.covered = collision if isinstance(collision, CoveredCollision) else None
-        low, high = (-most, most) if self.covered is None else problem.limits.T
+        self.is_covered = isinstance(problem.collision, CoveredCollision)
+        low, high = problem.limits.T if self.is_covered else (-np.inf, np.inf)
         # ends that lie on a limit lie within it, whatever the last bit of the conversion is
         low = np.minimum(low, np.minimum(problem.start, problem.goal))
         high = np.maximum(high, np.maximum(problem.start, problem.goal))
-        # least and greatest angle of each joint, each (nq, 1, 1) [deg]
-        self.limits = low[:, None, None], high[:, None, None]
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
         self.settings = kernels.Settings(
             arm_slices=problem.arm_slices,
@@ -92,16 +85,8 @@ class Strings:
             relaxation_step=planner.relaxation_step,
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,
-            tables=getattr(problem.collision, "tables", ()),
-        )
-
-    @property
-    def generations_per_call(self) -> int:
-        """Generations that are best computed at once."""
-        if self.covered is not None:
-            return 1
-        return generations_per_call(
-            PER_CALL, self.empty(self.planner.ga.population_size).nbytes, CACHED
+            tables=problem.collision.tables,
+            limits=np.column_stack([low, high]),
         )
 
     @property
@@ -132,20 +117,13 @@ class Strings:
         step, max_turn = self.planner.walk_step, DEGREE * self.planner.max_turn
         ends = problem.start, problem.goal
         walk_strings(strings, lanes, uniforms, *ends, problem.arm_slices, step, max_turn)
-        self.smooth(strings, count)
-        return strings
-
-    def smooth(self, strings: FloatArray, count: int) -> None:
-        """Redistribute and relax the first `count` strings; what leaves the limits is put there."""
         kernels.smooth(strings, count, self.settings)
-        if self.covered is not None:
-            own, (low, high) = strings[:, :, :count], self.limits
-            np.minimum(np.maximum(own, low, out=own), high, out=own)
+        return strings
 
     def judge(self, strings: FloatArray, count: int) -> JudgementArrays:
         """Judge the first `count` strings: the terms are C1 … C5 of Eqs. 2–6."""
         terms = self.no_terms(strings, count)
-        self.write_terms(strings, terms)
+        kernels.judge(strings, self.settings, terms)
         collisions = terms.collisions[:count]
         tested = self.planner.num_via_points * self.settings.substeps * count
         named = {f"length_arm_{a + 1}_deg": row[:count] for a, row in enumerate(terms.lengths)}
@@ -153,25 +131,6 @@ class Strings:
             named[f"unevenness_arm_{a + 1}_deg"] = row[:count]
         named["collisions"] = collisions
         return JudgementArrays(terms.cost, collisions == 0.0, tested, named)
-
-    def write_terms(self, strings: FloatArray, terms: StringTerms) -> None:
-        """Write the terms of strings (Eqs. 2–7)."""
-        if self.covered is None:
-            kernels.judge(strings, self.settings, terms)
-            return
-        count, substeps = len(terms.cost), self.settings.substeps
-        measure_paths(strings, self.problem.arm_slices, terms.lengths, terms.unevenness)
-        between = interpolate_linear(np.ascontiguousarray(strings[:, :, :count]), substeps)
-        collides = self.covered.collides(between.reshape(len(between), -1))
-        hits = np.where(collides, -1.0, 1.0).reshape(1, -1, substeps, count)
-        count_collisions(hits, terms.collisions[:count])
-        weigh(self.settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)
-
-    def table(self, places: int) -> kernels.Population:
-        """Return memory for the populations of some generations; the padding holds zeros."""
-        size = self.planner.ga.population_size
-        costs, collisions = np.empty((2, places, size))
-        return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
 
     def no_terms(self, strings: FloatArray, count: int) -> StringTerms:
         """Return memory for the terms of the first `count` strings; all but costs are padded."""
@@ -182,18 +141,17 @@ class Strings:
 class Search(GeneticSearch):
     """One run, and memory for its generations."""
 
-    def __init__(
-        self,
-        planner: "ViaPointGa",
-        problem: Problem,
-        strings: Strings,  # the planner's steps on this problem
-        per_call: int | None = None,  # generations computed at once; None: as many as is best
-    ) -> None:
+    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
         """Begin a run."""
-        ga, operators = planner.ga, planner.operators
-        super().__init__(ga, operators, strings.genome, per_call or strings.generations_per_call)
+        ga, strings = planner.ga, Strings(planner, problem)
+        population, offspring = strings.empty(ga.population_size), strings.empty(ga.num_offspring)
+        # testing covered bodies takes far longer than a call
+        one_by_one = planner.answers_are_proven or strings.is_covered
+        per_call = generations_per_call(1 if one_by_one else PER_CALL, population.nbytes, CACHED)
+        super().__init__(ga, planner.operators, strings.genome, per_call)
         self._planner, self._problem, self._strings = planner, problem, strings
-        self.table, offspring = strings.table(self.num_places), strings.empty(ga.num_offspring)
+        costs, collisions = np.empty((2, self.num_places, ga.population_size))
+        self.table = kernels.Population(np.array([population] * self.num_places), costs, collisions)
         terms = strings.no_terms(offspring, ga.num_offspring)
         self.scratch = kernels.Scratch(offspring, terms, self.elites, self.parents)
         self.costs, self._shown = self.table.costs, np.empty(self.table.strings.shape[1:])
@@ -209,25 +167,10 @@ class Search(GeneticSearch):
 
     def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Compute generations (section 3.4)."""
-        (select, cross, mutate), rules, own = self.operators, self.breeding, self._strings
-        if own.covered is None:
-            arguments = rules, own.settings, self.table, self.scratch, self.summaries
-            kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
-            return first + len(uniforms)
-        offspring, terms, elites, parents = self.scratch
-        here, there = first % self.num_places, (first + 1) % self.num_places
-        before, after = (
-            kernels.Population(*(array[place] for array in self.table)) for place in (here, there)
-        )
-        choose_elites(before.costs, elites)
-        genomes, out = kernels.by_gene(before.strings), kernels.by_gene(offspring)
-        rest = first, rules.mutation_rate, rules, before.costs, genomes, parents, out
-        breed(select, cross, mutate, uniforms[0], normals, *rest)
-        own.smooth(offspring, len(parents))
-        own.write_terms(offspring, terms)
-        kernels.follow(before, self.scratch, after)
-        kernels.summarise_strings(*after[1:], self.summaries[there])
-        return first + 1
+        (select, cross, mutate), settings = self.operators, self._strings.settings
+        arguments = self.breeding, settings, self.table, self.scratch, self.summaries
+        kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
+        return first + len(uniforms)
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return a string and its terms, judged once more by itself."""
@@ -245,16 +188,16 @@ class Search(GeneticSearch):
         return self._shown
 
     def _summarise(self, place: int) -> None:
-        costs, collisions = self.costs[place], self.table.collisions[place]
-        kernels.summarise_strings(costs, collisions, self.summaries[place])
+        free = self.table.collisions[place] == 0.0
+        summarise(self.costs[place], free, self.summaries[place])
 
 
 class ProvenSearch(Search):
     """A run whose best string is proven: what is refuted costs more in the next generation."""
 
-    def __init__(self, planner: "ViaPointGa", problem: Problem, strings: Strings) -> None:
+    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
         """Begin a run, see `Search`, without any verdict."""
-        super().__init__(planner, problem, strings, per_call=1)
+        super().__init__(planner, problem)
         self._proofs = Proofs(planner, problem)
 
     def improve(self, places: IntArray) -> list[Best]:

@@ -22,7 +22,6 @@ from evoexp.numeric.vectors import (
     spread,
     store,
     upper,
-    whole,
 )
 from evoexp.records import FloatArray
 
@@ -77,7 +76,6 @@ CASES: dict[str, tuple[Function, Function]] = {  # of lanes, of numpy
     "root": (lambda a, b: root(a), lambda x, y: np.sqrt(x)),
     "magnitude": (lambda a, b: magnitude(a), lambda x, y: np.abs(x)),
     "ceiling": (lambda a, b: ceiling(a), lambda x, y: np.ceil(x)),
-    "whole": (lambda a, b: whole(a), lambda x, y: np.rint(x)),
     "spread": (lambda a, b: spread(2.5), lambda x, y: np.full_like(x, 2.5)),
     "select": (lambda a, b: select(a < b, a, b), lambda x, y: np.where(x < y, x, y)),
     "lower": (lambda a, b: lower(a, b), lambda x, y: np.where(y < x, y, x)),

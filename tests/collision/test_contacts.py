@@ -189,22 +189,18 @@ def touching(
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_clearances_are_those_of_the_centres(robot: str) -> None:
-    ball, rng = sphere((1.0, 2.0, 0.0), 0.75), np.random.default_rng(1)
-    collision = touching(ROBOTS[robot], obstacles=(ball,))
-    model, shapes = collision.assembly.model, collision.shapes
-    arms, data = np.repeat(np.arange(len(collision.counts)), collision.counts), model.createData()
-    for q in rng.uniform(-720.0, 720.0, size=(133, model.nq)):
-        pin.forwardKinematics(model, data, DEGREE * q)
-        spheres = zip(shapes.joint.tolist(), shapes.start, strict=True)
-        centres = np.array([data.oMi[joint].act(center) for joint, center in spheres])
-        apart = np.linalg.norm(centres[:, None] - centres, axis=2)
-        between = apart[arms[:, None] != arms].min(initial=np.inf) - 2.0 * 0.5
-        outside = np.linalg.norm(centres - ball.center, axis=1).min() - 0.75 - 0.5
-        exact = collision.clearance(q[:, None])
-        assert np.allclose(exact.between_arms, between, rtol=0.0, atol=1e-12)
-        assert np.allclose(exact.to_obstacles, outside, rtol=0.0, atol=1e-12)
-        assert np.isposinf(between) == (robot == "alone")
+def test_clearances_are_those_of_the_general_model(robot: str) -> None:
+    """Which stands beside coal and a plain reference of its own."""
+    rng = np.random.default_rng(1)
+    for obstacles in (*((each,) for each in arms_6r.OBSTACLES), arms_6r.OBSTACLES):
+        collision = touching(ROBOTS[robot], obstacles=obstacles)
+        q = rng.uniform(-720.0, 720.0, size=(collision.collision.nq, 133))
+        exact, general = collision.clearance(q), collision.collision.clearance(DEGREE * q)
+        arms, solids = exact.between_arms, exact.to_obstacles
+        assert np.allclose(arms, general.between_arms, rtol=0.0, atol=1e-12)
+        assert np.allclose(solids, general.to_obstacles, rtol=0.0, atol=1e-12)
+        assert np.isposinf(arms).all() == (robot == "alone")
+        assert np.array_equal(collision.collides(q), exact.least < 0.0)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

@@ -1,6 +1,8 @@
 """Links as strings of touching circles or spheres (Rana & Zalzala 1995, Fig. 3).
 
-Any number of arms, in the plane or in space, among static obstacles.
+Any number of arms, in the plane or in space, among static obstacles. Yes and no come
+from `body_collision`; clearances, which are asked for at the ends of a search, from the centres
+here.
 """
 
 import itertools
@@ -9,13 +11,27 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
+from evoexp.collision.bodies.body_collision import (
+    BodyCollision,
+    Clearances,
+    FreeTest,
+    contiguous_batch,
+)
 from evoexp.collision.bodies.packing import Shapes
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
+from evoexp.robots.poses import frame_poses
+from evoexp.scenarios.obstacles import (
+    CAPSULE,
+    CYLINDER,
+    HALF_SPACE,
+    SPHERE,
+    ObstacleTable,
+    obstacle_table,
+)
 from evoexp.validation import Component, LayoutCount, Positive
 
 MOST_PER_LINK = 1000  # spheres; every one is tested against those of the other arms
@@ -101,7 +117,27 @@ class SphereCollision(NamedTuple):
 
     def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
-        return self.collision.clearance(DEGREE * q)
+        q = DEGREE * contiguous_batch(q, self.collision.nq)
+        table, pose = self.assembly.table, np.empty((12, q.shape[1]))
+        centers = np.empty((len(self.shapes.joint), 3, q.shape[1]))
+        for k, (joint, center) in enumerate(zip(*self.shapes[:2], strict=True)):
+            local = np.append(np.eye(3), table.local(joint, center))
+            frame_poses(table.chain, joint - 1, local, q, pose)
+            centers[k] = pose[9:]
+        squares = np.full(q.shape[1], np.inf)
+        of_arms = np.split(centers, np.cumsum(self.counts)[:-1])
+        for one, two in itertools.combinations(of_arms, 2):
+            for center in one:
+                x, y, z = (center - two).transpose(1, 0, 2)
+                squares = np.minimum(squares, (x * x + y * y + z * z).min(axis=0))
+        outside = np.full(q.shape[1], np.inf)
+        for kind, middle, rotation, size in zip(*self.obstacles, strict=True):
+            points = centers.transpose(0, 2, 1) - middle
+            distances = _signed_distances(
+                kind, size, matrix_product(points, rotation.reshape(3, 3))
+            )
+            outside = np.minimum(outside, distances.min(axis=0))
+        return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations (nq, configurations) [deg] collide."""
@@ -111,3 +147,19 @@ class SphereCollision(NamedTuple):
     def free_test(self) -> FreeTest:
         """The test of configurations for kernels of other rooms."""
         return self.collision.free_test
+
+
+def _signed_distances(kind: int, size: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the signed distances of points (…, 3) in an obstacle's frame from its surface, (…)."""
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    if kind == HALF_SPACE:
+        return z
+    if kind in (SPHERE, CAPSULE):
+        along = z - np.clip(z, -size[1], size[1])
+        return np.asarray(np.sqrt(x * x + y * y + along * along) - size[0])
+    beyond = [np.abs(x) - size[0], np.abs(y) - size[1], np.abs(z) - size[2]]
+    if kind == CYLINDER:
+        beyond = [np.sqrt(x * x + y * y) - size[0], np.abs(z) - size[1]]
+    within = np.minimum(np.maximum.reduce(beyond), 0.0)
+    squares = [np.maximum(off, 0.0) * np.maximum(off, 0.0) for off in beyond]
+    return np.asarray(np.sqrt(sum(squares[1:], squares[0])) + within)

@@ -59,16 +59,21 @@ def compiled() -> Any:
 
 def _arms(condition: Condition, problem: Any) -> _Arms:
     """Return the scene as the C reference takes it."""
-    arms, spheres = _Arms(), problem.collision.spheres
+    arms, shapes, first = _Arms(), problem.collision.shapes, 0
     assert not condition.scenario.obstacles
-    robots = zip(problem.collision.arm_spheres, condition.robot.arms, strict=True)
-    for a, ((first, stop), robot) in enumerate(robots):
-        assert stop - first == CIRCLES and len(robot.link_lengths) == 2 and not robot.base_angle
+    for a, robot in enumerate(condition.robot.arms):
+        stop = first + CIRCLES
+        assert (
+            problem.collision.counts[a] == CIRCLES
+            and len(robot.link_lengths) == 2
+            and not robot.base_angle
+        )
         arms.base[a][:] = robot.base_position
         arms.length[a] = robot.link_lengths[0]
-        arms.along[a][:] = spheres.local[first:stop, 0]
-        arms.link[:] = spheres.joint[first:stop] - spheres.joint[first]
-    arms.radius = spheres.radius
+        arms.along[a][:] = shapes.start[first:stop, 0]
+        arms.link[:] = shapes.joint[first:stop] - shapes.joint[first]
+        first = stop
+    arms.radius = problem.collision.radius
     arms.weights[:] = condition.planner.objective.weights
     return arms
 

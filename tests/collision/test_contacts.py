@@ -13,7 +13,6 @@ import pytest
 from collision.built_bodies import built, num_before_contact
 from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
 from evoexp.collision.bodies.packing import Shapes
-from evoexp.collision.bodies.planar_contacts import contacts, link_lines
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.numeric.elementary import DEGREE
 from evoexp.robots.arms import Arms
@@ -195,8 +194,8 @@ def test_clearances_are_those_of_the_general_model(robot: str) -> None:
     rng = np.random.default_rng(1)
     for obstacles in (*((each,) for each in arms_6r.OBSTACLES), arms_6r.OBSTACLES):
         collision = touching(ROBOTS[robot], obstacles=obstacles)
-        q = rng.uniform(-720.0, 720.0, size=(collision.general.nq, 133))
-        exact, general = collision.clearance(q), collision.general.clearance(DEGREE * q)
+        q = rng.uniform(-720.0, 720.0, size=(collision.collision.nq, 133))
+        exact, general = collision.clearance(q), collision.collision.clearance(DEGREE * q)
         arms, solids = exact.between_arms, exact.to_obstacles
         assert np.allclose(arms, general.between_arms, rtol=0.0, atol=1e-12)
         assert np.allclose(solids, general.to_obstacles, rtol=0.0, atol=1e-12)
@@ -211,14 +210,14 @@ def test_circles_at_equal_steps_collide_where_their_clearance_is_negative(
     robot: str, spheres: int, count: int
 ) -> None:
     collision = touching(ROBOTS[robot], spheres)
-    rng, nq = np.random.default_rng(spheres + count), collision.general.nq
+    rng, nq = np.random.default_rng(spheres + count), collision.collision.nq
     for spread in (180.0, 5.0):
         middle = rng.uniform(-180.0, 180.0, size=(nq, 1))
         q = middle + rng.uniform(-spread, spread, size=(nq, count))
         exact = collision.clearance(q).least
         assert np.abs(exact).min() > 1e-10
         assert np.array_equal(collision.collides(q), exact < 0.0)
-        assert num_before_contact(collision.general, DEGREE * q) == leading_free(exact < 0.0)
+        assert num_before_contact(collision.collision, DEGREE * q) == leading_free(exact < 0.0)
 
 
 def test_circles_that_touch_are_measured_exactly() -> None:
@@ -243,27 +242,9 @@ def test_large_angles_and_what_is_not_a_number_are_measured_exactly() -> None:
     assert np.array_equal(collision.collides(q), ~(exact >= 0.0))
 
 
-def test_spheres_at_unequal_steps_are_measured_exactly() -> None:
-    collision, links = touching(TWO_PLANAR), np.array([[0, 5]])
-    shapes = collision.shapes
-    joint, local, radius = shapes.joint - 1, shapes.start, collision.radius
-    for axis, is_equal in ((0, True), (1, False), (2, False)):
-        moved = local.copy()
-        moved[2, axis] += 0.0 if is_equal else 0.7
-        chain = collision.assembly.table.chain
-        lines = link_lines(chain, joint, moved, radius, links, np.array([[0, 1]]))
-        assert (lines.scale < np.inf) is is_equal
-    tables = collision.tables
-    unequal = tables._replace(lines=tables.lines._replace(scale=np.inf))
-    q = np.random.default_rng(0).uniform(-180.0, 180.0, size=(4, 300))
-    out = np.empty(300)
-    contacts(unequal, q, 0, out)
-    assert np.array_equal(out < 0.0, collision.clearance(q).least < 0.0)
-
-
 def test_circles_stand_joint_to_joint_and_shared_ones_count_once() -> None:
     collision = touching(TWO_PLANAR)
-    assert collision.arm_spheres.tolist() == [[0, 9], [9, 18]]
+    assert collision.counts.tolist() == [9, 9]
     assert collision.shapes.start[:9, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0]
     assert touching(ROBOTS["alone"], 1).shapes.start[:, 0].tolist() == [2.0, 2.0]
     with pytest.raises(ValueError, match=r"q must have shape \(4, configurations\)"):

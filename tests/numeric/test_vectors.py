@@ -10,7 +10,6 @@ from numba.core.errors import TypingError
 
 from evoexp.numeric.compilation import copy_part, kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
 from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
@@ -23,7 +22,6 @@ from evoexp.numeric.vectors import (
     spread,
     store,
     upper,
-    whole,
 )
 from evoexp.records import FloatArray
 
@@ -78,7 +76,6 @@ CASES: dict[str, tuple[Function, Function]] = {  # of lanes, of numpy
     "root": (lambda a, b: root(a), lambda x, y: np.sqrt(x)),
     "magnitude": (lambda a, b: magnitude(a), lambda x, y: np.abs(x)),
     "ceiling": (lambda a, b: ceiling(a), lambda x, y: np.ceil(x)),
-    "whole": (lambda a, b: whole(a), lambda x, y: np.rint(x)),
     "spread": (lambda a, b: spread(2.5), lambda x, y: np.full_like(x, 2.5)),
     "select": (lambda a, b: select(a < b, a, b), lambda x, y: np.where(x < y, x, y)),
     "lower": (lambda a, b: lower(a, b), lambda x, y: np.where(y < x, y, x)),
@@ -127,44 +124,23 @@ def test_neighbours_are_read_and_written_where_they_are_named() -> None:
 # Sines and cosines
 
 
-def turns() -> FloatArray:
-    rng = np.random.default_rng(0)
-    some = [rng.uniform(-2.0, 2.0, 20_000), rng.uniform(-1e3, 1e3, 20_000), np.arange(-50.0, 50.0)]
-    near = np.arange(-50.0, 50.0) + 0.5  # where the quarter changes
-    return np.concatenate([*some, near, np.nextafter(near, 0.0)])[: 40_300 // LANES * LANES]
-
-
 def angles() -> FloatArray:
     octants, rng = np.arange(-400, 400) * (np.pi / 4.0), np.random.default_rng(0)
     every = np.concatenate([SPECIAL[:-2], octants, rng.uniform(-1e5, 1e5, 4000)])
     return every[: len(every) // LANES * LANES]
 
 
-@pytest.mark.parametrize(("function", "x"), [(sincos, angles()), (sincos_of_turn, turns())])
-def test_sines_and_cosines_have_the_bits_of_scalars(function: Function, x: FloatArray) -> None:
+def test_sines_and_cosines_have_the_bits_of_scalars() -> None:
     @kernel
     def scalars(x: FloatArray, out: FloatArray) -> None:
         for k in range(len(x)):
-            out[0, k], out[1, k] = function(x[k])
+            out[0, k], out[1, k] = sincos(x[k])
 
+    x = angles()
     expected = np.empty((2, len(x)))
     scalars(x, expected)
     for row in (0, 1):
-        assert same(over_lanes(lambda a, b, row=row: function(a)[row])(x, x), expected[row])
-
-
-def test_sines_and_cosines_of_turns_are_right() -> None:
-    """A whole number of turns is taken off without rounding; whole quarters are exact."""
-    s, c = (over_lanes(lambda a, b, row=row: sincos_of_turn(a)[row]) for row in (0, 1))
-    t, right_angle = turns(), np.arccos(np.longdouble(0.0))
-    rest = (t - 4.0 * np.floor(t / 4.0)).astype(np.longdouble) * right_angle
-    assert float(np.abs(s(t, t) - np.sin(rest)).max()) < 1e-14
-    assert float(np.abs(c(t, t) - np.cos(rest)).max()) < 1e-14
-    assert float(np.abs(s(t, t) ** 2 + c(t, t) ** 2 - 1.0).max()) > 1e-15  # it is the quick one
-    assert np.float64(right_angle) == QUARTER_TURN
-    quarters = np.arange(-16.0, 16.0)
-    assert np.array_equal(s(quarters, quarters), [0.0, 1.0, 0.0, -1.0] * 8)
-    assert np.array_equal(c(quarters, quarters), [1.0, 0.0, -1.0, 0.0] * 8)
+        assert same(over_lanes(lambda a, b, row=row: sincos(a)[row])(x, x), expected[row])
 
 
 # Rows and columns, and parts of arrays

@@ -236,8 +236,8 @@ def _reinterpretation(targets: dict[Any, Any]) -> Any:
 
 
 # of every lane: the square root, correctly rounded; the absolute value; the least whole number not
-# below; the nearest whole number, the even one of two
-root, magnitude, ceiling, whole = map(_of_llvm, ("sqrt", "fabs", "ceil", "rint"))
+# below
+root, magnitude, ceiling = map(_of_llvm, ("sqrt", "fabs", "ceil"))
 # the bits of a float64 as an int64, of a vector as eight of them; and back
 to_bits = _reinterpretation({types.float64: types.int64, vector_type: word_type})
 from_bits = _reinterpretation({types.int64: types.float64, word_type: vector_type})

@@ -12,7 +12,6 @@ import numpy as np
 from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
 from evoexp.collision.bodies.packing import Shapes
-from evoexp.collision.bodies.planar_contacts import NO_LINES, CircleTables
 from evoexp.collision.derived_pairs import Pair
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
@@ -79,11 +78,6 @@ class CoveredCollision(NamedTuple):
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations (nq, configurations) [deg] collide."""
         return self.collision.collides(DEGREE * q)
-
-    @property
-    def tables(self) -> CircleTables:
-        """Tables for the kernel `contacts`."""
-        return CircleTables(self.assembly.table.chain, NO_LINES, self.collision.tables)
 
     @property
     def free_test(self) -> FreeTest:

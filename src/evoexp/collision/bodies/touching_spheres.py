@@ -1,8 +1,8 @@
 """Links as strings of touching circles or spheres (Rana & Zalzala 1995, Fig. 3).
 
-Any number of arms, in the plane or in space, among static obstacles. Yes and no come from
-`planar_contacts` or `body_collision`; clearances, which are asked for at the ends of a search, from
-the centres here.
+Any number of arms, in the plane or in space, among static obstacles. Yes and no come
+from `body_collision`; clearances, which are asked for at the ends of a search, from the centres
+here.
 """
 
 import itertools
@@ -18,7 +18,6 @@ from evoexp.collision.bodies.body_collision import (
     contiguous_batch,
 )
 from evoexp.collision.bodies.packing import Shapes
-from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product
@@ -63,24 +62,16 @@ class TouchingSpheres(Component):
                 "tool_radius above 0",
             )
         arms, moving, centers = self._placed(assembly)
-        radii, table = np.full(len(arms), self.sphere_radius), assembly.table
-        local = np.array([table.local(*sphere) for sphere in zip(moving, centers, strict=True)])
-        radius, of_arms = self.sphere_radius, _ranges(arms)
-        # the general model: bodies of different arms against each other, and against obstacles
+        radii = np.full(len(arms), self.sphere_radius)
+        # bodies of different arms against each other, and against obstacles
         arm_of = dict(zip(moving.tolist(), arms.tolist(), strict=True))
         between = [(j, k) for j, k in itertools.combinations(arm_of, 2) if arm_of[j] != arm_of[k]]
         arm_of_joints = [arm_of.get(joint, -1) for joint in range(assembly.model.njoints)]
         around = obstacle_table(obstacles).without_ellipses()
         shapes = Shapes(moving, centers, centers, radii, moving)
-        general = BodyCollision.build(table, shapes, around, between, (), arm_of_joints)
-        # the planar one, of links as lines of circles
-        of_links = _ranges(np.cumsum(np.diff(moving, prepend=moving[0]) != 0))
-        arm_links = _ranges(arms[of_links[:, 0]])
-        lines = link_lines(table.chain, moving - 1, local, radius, of_links, arm_links)
-        if not table.planar or len(around.kind):
-            lines = lines._replace(scale=np.inf)
-        tables = CircleTables(table.chain, lines, general.tables)
-        return SphereCollision(assembly, radius, shapes, of_arms, around, general, tables)
+        collision = BodyCollision.build(assembly.table, shapes, around, between, (), arm_of_joints)
+        counts = np.bincount(arms)
+        return SphereCollision(assembly, self.sphere_radius, shapes, counts, around, collision)
 
     def _placed(self, assembly: Assembly) -> tuple[IntArray, IntArray, FloatArray]:
         """Return arm, joint and centre (3,) of each sphere on the links that move.
@@ -108,37 +99,25 @@ class TouchingSpheres(Component):
         return np.array(arms), np.array(joints, dtype=np.int64), np.array(centers)
 
 
-def _ranges(owners: IntArray) -> IntArray:
-    """Return (owners, 2): where each owner's run begins and ends in a sorted list of owners."""
-    return np.array(
-        [
-            [np.searchsorted(owners, k), np.searchsorted(owners, k, side="right")]
-            for k in range(owners[-1] + 1)
-        ]
-    )
-
-
 class SphereCollision(NamedTuple):
     """Touching spheres on one robot, and the obstacles around it."""
 
     assembly: Assembly  # the robot
     radius: float  # of every sphere [length unit]
     shapes: Shapes  # the spheres
-    arm_spheres: IntArray  # (arms, 2) first and one-past-last sphere of each arm
+    counts: IntArray  # (arms,) spheres of each arm
     obstacles: ObstacleTable  # the obstacle table
-    general: BodyCollision  # the same spheres in the model of spheres and capsules
-    tables: CircleTables  # for the kernel `contacts`
+    collision: BodyCollision  # the kernels' tables
 
     @property
     def num_tests(self) -> int:
         """Pairs of shapes that one configuration has: spheres of two arms, and with obstacles."""
-        own = [int(stop - first) for first, stop in self.arm_spheres]
-        between = sum(a * b for a, b in itertools.combinations(own, 2))
-        return between + sum(own) * len(self.obstacles.kind)
+        between = sum(int(a * b) for a, b in itertools.combinations(self.counts, 2))
+        return between + len(self.shapes.joint) * len(self.obstacles.kind)
 
     def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
-        q = DEGREE * contiguous_batch(q, self.general.nq)
+        q = DEGREE * contiguous_batch(q, self.collision.nq)
         table, pose = self.assembly.table, np.empty((12, q.shape[1]))
         centers = np.empty((len(self.shapes.joint), 3, q.shape[1]))
         for k, (joint, center) in enumerate(zip(*self.shapes[:2], strict=True)):
@@ -146,9 +125,10 @@ class SphereCollision(NamedTuple):
             frame_poses(table.chain, joint - 1, local, q, pose)
             centers[k] = pose[9:]
         squares = np.full(q.shape[1], np.inf)
-        for (first, stop), (begin, end) in itertools.combinations(self.arm_spheres, 2):
-            for center in centers[first:stop]:
-                x, y, z = (center - centers[begin:end]).transpose(1, 0, 2)
+        of_arms = np.split(centers, np.cumsum(self.counts)[:-1])
+        for one, two in itertools.combinations(of_arms, 2):
+            for center in one:
+                x, y, z = (center - two).transpose(1, 0, 2)
                 squares = np.minimum(squares, (x * x + y * y + z * z).min(axis=0))
         outside = np.full(q.shape[1], np.inf)
         for kind, middle, rotation, size in zip(*self.obstacles, strict=True):
@@ -160,16 +140,13 @@ class SphereCollision(NamedTuple):
         return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
-        """Return which configurations collide, (configurations,): where `clearance` is negative."""
-        q = contiguous_batch(q, self.general.nq)
-        out = np.empty(q.shape[1])
-        contacts(self.tables, q, 0, out)
-        return np.asarray(~(out >= 0.0))
+        """Return which configurations (nq, configurations) [deg] collide."""
+        return self.collision.collides(DEGREE * q)
 
     @property
     def free_test(self) -> FreeTest:
         """The test of configurations for kernels of other rooms."""
-        return self.general.free_test
+        return self.collision.free_test
 
 
 def _signed_distances(kind: int, size: FloatArray, points: FloatArray) -> FloatArray:

@@ -3,15 +3,17 @@
 Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.planar_contacts import contacts
+from evoexp.collision.bodies.body_tables import FlatTables
+from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.lengths import measure_paths, relax_points
@@ -29,7 +31,7 @@ class Settings(NamedTuple):
     relaxation_step: float  # delta of Eqs. 8, 9
     substeps: int  # configurations tested per segment
     weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7
-    tables: Any  # `CircleTables` of the collision model
+    tables: FlatTables  # of the circles, spheres or covers of bodies
     limits: FloatArray  # (nq, 2) of the joints, infinite where bodies are not covered [deg]
 
 
@@ -143,8 +145,10 @@ def judge(strings: FloatArray, settings: Settings, terms: StringTerms) -> None:
     if substeps > 1:
         configurations, start = np.empty((nq, (num_points - 1) * substeps, lanes)), 0
         interpolate(strings, substeps, configurations)
-    hits = np.empty((num_points - 1) * substeps * lanes)
-    contacts(settings.tables, configurations.reshape((nq, -1)), start, hits)
+    angles = configurations.reshape((nq, -1))[:, start:] * DEGREE
+    clearances = np.empty((3, angles.shape[1]))
+    least_clearances(settings.tables, 0.0, True, angles, clearances)
+    hits = np.minimum(clearances[0], np.minimum(clearances[1], clearances[2]))
     count_collisions(hits.reshape((num_points - 1, substeps, lanes)), terms.collisions)
     # Eq. 7
     weigh(settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

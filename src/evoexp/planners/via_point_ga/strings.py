@@ -52,7 +52,7 @@ class Problem(ArmProblem):
         data, spheres = model.createData(), zip(shapes.joint.tolist(), shapes.start, strict=True)
         pin.forwardKinematics(model, data, DEGREE * q)
         centres = np.array([data.oMi[joint].act(center) for joint, center in spheres])
-        return [centres[first:stop] for first, stop in self._spheres.arm_spheres]
+        return np.split(centres, np.cumsum(self._spheres.counts)[:-1])
 
     def centre_distances(self, q: FloatArray) -> FloatArray:
         """Return the least distance between centres of two arms, as the paper's Figs. 7 and 13 do.
@@ -85,7 +85,7 @@ class Strings:
             relaxation_step=planner.relaxation_step,
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,
-            tables=problem.collision.tables,
+            tables=problem.collision.collision.tables,
             limits=np.column_stack([low, high]),
         )
 

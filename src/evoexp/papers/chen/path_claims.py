@@ -241,11 +241,11 @@ def converges(condition: ConditionResults, converging: Proportion) -> bool | Non
 
 
 def different_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
-    """Judge that the best paths known of the three weightings differ."""
+    """Judge that weightings can lead to different paths, by the best ones known of them."""
     if len(groups) == 3 and all(group.truth is not None for group in groups):
         paths = len({tuple(map(tuple, group.best_path[0].tolist())) for group in groups})
         told = {"paths": paths, "weightings": len(groups)}
-        yield judge.on("different_paths").own(told, len(groups), paths == len(groups))
+        yield judge.on("different_paths").own(told, len(groups), paths > 1)
 
 
 def known_excess(truth: ConditionResults | None, shortest_known: float) -> str:

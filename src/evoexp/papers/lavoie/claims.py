@@ -196,6 +196,8 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "clear": lambda anywhere: Proportion(anywhere.total - anywhere.having, anywhere.total),
     "median_error": lambda condition: _median(condition, measures.errors),
     "median_effort": lambda condition: _median(condition, measures.effort),
+    # whether effort says something: what never stops takes all its evaluations
+    "can_stop": lambda real: "never stopped" not in real,
     # labels of conditions that differ in their coding alone: real, binary
     "codings": lambda: [
         (f"{arm}real{end}", f"{arm}binary{rate}{end}")

@@ -76,6 +76,24 @@ def test_a_killed_worker_loses_nothing_but_its_own_replicate(
 
 
 @pytest.mark.matrix
+def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(
+    faulty: Condition, tmp_path: Path, fail: Callable[[str], None]
+) -> None:
+    from distributed import LocalCluster
+
+    fail("slow:11")
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+        settings = {"backend": "dask", "address": local.scheduler_address}
+        outcomes = new_batch(tmp_path / "outputs", (faulty, 12), **settings).run()
+        next(outcomes)
+        local.sync(local.scheduler.close)
+        must = r"^runner\.address: the scheduler at tcp://.* went away; finished replicates"
+        with pytest.raises(cluster.ClusterError, match=must):
+            list(outcomes)
+    assert RunDirectory(tmp_path / "outputs", faulty.id).completed()
+
+
+@pytest.mark.matrix
 def test_a_worker_with_other_code_is_refused(
     faulty: Condition, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

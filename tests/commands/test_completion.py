@@ -47,7 +47,7 @@ def test_commands_and_options(complete: Complete) -> None:
     assert complete("repro") == ["reproduce"]
     assert "--config-dir" in complete("run", "--")
     assert set(complete("export", "m.json", "--format", "")) >= {"csv", "json"}
-    assert complete("new", "") == ["planner", "operator"]
+    assert complete("new", "") == ["planner", "operator", "paper"]
 
 
 def test_overrides_and_their_options(complete: Complete) -> None:

@@ -1,4 +1,4 @@
-"""`evoexp pack`, archives as words of `reproduce` and `report`, and `evoexp clean`."""
+"""`evoexp pack`, archives as words of other commands, and `evoexp clean`."""
 
 import json
 import shutil
@@ -9,8 +9,9 @@ import pytest
 from command_samples import Evoexp, content, with_manifest
 
 from evoexp.store.archive import pack
+from evoexp.store.log import SUMMARY
 from evoexp.store.run_directory import RunDirectory
-from forged_logs import with_message
+from forged_logs import with_message, with_metadata
 from store_lookup import find_runs
 
 
@@ -53,6 +54,62 @@ def test_show_and_diff_look_into_an_archive(
         assert evoexp("diff", f"{packed}:{one.hash12}", f"{packed}:{other.hash12}").code == code
     assert f"choose one: {packed}:" in refused("diff", str(packed), f"{packed}:{one.hash12}")
     assert "begins 0 (holds: " in refused("show", f"{packed}:ffff")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(("list", "--json"), ("verify", "--json"), ("show", "ONE", "--json")),
+        ("diff", "ONE", "TWO", "--json"),
+    ],
+)
+def test_an_archive_looks_as_its_runs_do_after_they_are_taken_in(
+    evoexp: Evoexp, packed: Path, stored: Path, words: tuple[str, ...]
+) -> None:
+    one, two = (run.hash12 for run in find_runs(stored)[:2])
+    shutil.rmtree(stored)
+
+    def said(place: str) -> tuple[int, object]:
+        hashes = {"ONE": f"{place}{one}", "TWO": f"{place}{two}"}
+        archive = [str(packed)] if place and words[0] in ("list", "verify") else []
+        answer = evoexp(*(hashes.get(word, word) for word in words), *archive)
+        found = json.loads(answer.out)
+        if words[0] == "show":
+            del found["origin"]["directory"]
+        return answer.code, found["runs"] if words[0] == "list" else found
+
+    before = said(f"{packed}:")
+    assert not stored.exists()
+    assert evoexp("report", str(packed)).code == 0
+    assert said("") == before
+
+
+def test_list_and_verify_look_into_an_archive(
+    evoexp: Evoexp, packed: Path, stored: Path, run: RunDirectory, tmp_path: Path
+) -> None:
+    one, two = find_runs(stored)[:2]
+    lines = evoexp("list", str(packed)).out.splitlines()
+    assert lines[0].strip() == f"runs in {packed}" and "experiments" not in lines
+    listed = json.loads(evoexp("list", f"{packed}:{two.hash12}", "--json").out)
+    assert listed["experiments"] == []
+    assert [each["hash"] for each in listed["runs"]] == [two.condition_id]
+    assert f"no failed replicates in {packed}" in evoexp("list", "--failed", str(packed)).out
+    said = evoexp("verify", str(packed), one.hash12)
+    assert said.code == 0 and "3 runs, 6 logs: all is well" in said.out
+    log = run.log_path(1)
+    log.write_bytes(with_metadata(log.read_bytes(), SUMMARY, clearance=0.125))
+    pack([run], tmp_path / "forged.tar")
+    said = evoexp("verify", str(tmp_path / "forged.tar"), str(packed))
+    assert said.code == 1 and "1 damaged file in 1 of them" in said.out
+    assert "mend" not in said.out and str(stored) not in said.out
+
+
+def test_columns_of_a_difference_name_the_archive(
+    evoexp: Evoexp, packed: Path, stored: Path
+) -> None:
+    one = find_runs(stored)[0].hash12
+    out = evoexp("diff", f"{packed}:{one}", one).text
+    assert "two.tar" in out and out.count("two.tar") == 1
 
 
 def test_an_archive_is_compared_and_not_what_is_stored_already(
@@ -137,8 +194,16 @@ def test_a_manifest_of_other_kinds_is_damaged(
 
 def test_what_is_no_archive_is_refused(refused: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "bad.tar").write_bytes(b"nothing")
-    for command in ("reproduce", "report"):
-        assert "no archive of runs" in refused(command, str(tmp_path / "bad.tar"))
+    (tmp_path / "folder.tar").mkdir()
+    faults = {"bad": "no archive of runs", "none": "no such file", "folder": "is a directory"}
+    for name, fault in faults.items():
+        path = str(tmp_path / f"{name}.tar")
+        for command in ("show", "list", "verify", "reproduce", "report", "compare"):
+            assert f"{path}: " in (said := refused(command, path)) and fault in said
+        assert fault in refused("diff", "4da921", f"{path}:4da921")
+    assert "list: must be given an archive of runs, RUNS.tar, was '4da921'" in refused(
+        "list", "4da921"
+    )
 
 
 def test_clean_deletes_what_it_lists_and_only_if_told_so(

@@ -44,6 +44,8 @@ def cluster_fan_out(
     except ImportError:
         must = "runner=dask needs distributed: pip install 'evoexp[cluster]'"
         raise ClusterError(must) from None
+    # a lost scheduler is told below, in one line
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     with _client(distributed, settings) as client:
         num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
         replicates = Replicates(jobs, num_workers, limits)
@@ -64,6 +66,11 @@ def cluster_fan_out(
                 end = Died(0.0)  # the scheduler does not tell when it began
             except (ModuleNotFoundError, distributed.CancelledError) as error:
                 reason = printable(str(error).splitlines()[0])
+                if "scheduler-" in reason:  # connection-lost, restart
+                    raise ClusterError(
+                        f"runner.address: the scheduler at {client.scheduler.address} went away; "
+                        "finished replicates are stored: run again for the others"
+                    ) from None
                 must = f"runner.address: a worker cannot run evoexp: {reason}"
                 raise ClusterError(must) from None
             finally:

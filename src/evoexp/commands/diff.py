@@ -10,7 +10,7 @@ import numpy as np
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
-from evoexp.errors import UnknownHash
+from evoexp.errors import UnknownHash, printable
 from evoexp.records import TIMES
 from evoexp.store.identity import TAKEN
 from evoexp.store.manifest import changed, differences
@@ -31,6 +31,7 @@ class Side(NamedTuple):
     settings: dict[str, Any]  # its canonical form as plain data
     manifest: dict[str, Any] | None  # environment of its run; None: it was not run here
     rows: dict[int, dict[str, Any]]  # its replicates, done ones only
+    head: str  # of its column: hash, and the archive it is in
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -51,7 +52,7 @@ def main(arguments: argparse.Namespace) -> int:
         values = (one.condition_id, two.condition_id, settings, environment, results, same)
         print_json(dict(zip(KEYS, values, strict=True)))
     else:
-        heads = one.condition_id[:12], two.condition_id[:12]
+        heads = one.head, two.head
         _print("settings", heads, settings)
         if one.manifest is not None and two.manifest is not None:
             _print("environment", heads, environment)
@@ -69,18 +70,19 @@ def _side(prefix: str) -> Side:
             if len(runs) > 1:
                 choices = ", ".join(f"{prefix}:{run.hash12}" for run in runs[:NAMED])
                 raise UnknownHash(f"{prefix}: holds {len(runs)} runs; choose one: {choices}")
-            return _stored(runs[0])
+            found = _stored(runs[0])
+            return found._replace(head=f"{printable(packed[0].name)}\n{found.head}")
     run = stored_or_shipped(prefix)
     if isinstance(run, RunDirectory):
         return _stored(run)
     condition = shipped_experiment(run).conditions[0].condition
-    return Side(condition.id, json.loads(condition.to_json()), None, {})
+    return Side(condition.id, json.loads(condition.to_json()), None, {}, run.condition_id[:12])
 
 
 def _stored(run: RunDirectory) -> Side:
     table = summary_table(run).to_pylist()
     rows = {int(row["replicate"]): row for row in table if row["status"] == "done"}
-    return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), rows)
+    return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), rows, run.hash12)
 
 
 def _measured(row: Mapping[str, Any]) -> str:

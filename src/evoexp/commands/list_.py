@@ -2,21 +2,24 @@
 
 import argparse
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
+from evoexp.commands.pack import in_archive, looked_into
 from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
-from evoexp.errors import EvoexpError, printable
+from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.store.files import listed
 from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
+NamedRun = tuple[str, RunDirectory | EvoexpError]  # a damaged one: its error
 FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
 RUN_KEYS = (
     *("hash", *ORIGIN, "changed", "planned", "done", "failed", "solved", "certified"),
@@ -25,9 +28,20 @@ RUN_KEYS = (
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print both lists, or that of failures."""
+    """Print both lists, or that of failures; of an archive its runs alone."""
+    if arguments.archive is None:
+        return _print(arguments, f"stored in {outputs_root()}", stored_runs(outputs_root()))
+    packed = in_archive(arguments.archive)
+    if packed is None:
+        raise SettingError("list", "given an archive of runs, RUNS.tar", arguments.archive)
+    with looked_into(*packed) as runs:
+        place = f"in {printable(str(packed[0]))}"
+        return _print(arguments, place, ((run.hash12, run) for run in runs))
+
+
+def _print(arguments: argparse.Namespace, place: str, stored: Iterable[NamedRun]) -> int:
     if arguments.failed:
-        failures = _failures()
+        failures = _failures(stored)
         if arguments.json:
             print_json(failures)
         elif failures:
@@ -37,28 +51,29 @@ def main(arguments: argparse.Namespace) -> int:
                 table.add_row(each["hash"], label, str(each["replicate"]), reason)
             say(table)
         else:
-            say(f"no failed replicates in {outputs_root()}")
+            say(f"no failed replicates {place}")
         return 0
-    files = [find("experiment", name) for name in options("experiment")]
+    names = options("experiment") if arguments.archive is None else ()
+    files = [find("experiment", name) for name in names]
     rows = ((each.name, description(each.name), each.origin, each.path) for each in files)
     experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in rows]
-    runs = [run_row(name, run) for name, run in stored_runs(outputs_root())]
+    runs = [run_row(name, run) for name, run in stored]
     if arguments.json:
         print_json({"experiments": experiments, "runs": runs})
         return 0
     table = new_table("experiments", "run experiment=", "description", "from")
     for each in experiments:
         table.add_row(each["name"], each["description"], each["origin"])
-    say(table)
-    title = f"runs stored in {outputs_root()}"
-    say(run_table(title, runs) if runs else f"no runs stored in {outputs_root()}")
+    if experiments:
+        say(table)
+    say(run_table(f"runs {place}", runs) if runs else f"no runs {place}")
     return 0
 
 
-def _failures() -> list[dict[str, Any]]:
+def _failures(stored: Iterable[NamedRun]) -> list[dict[str, Any]]:
     """Return the failed replicates, run by run."""
     rows = []
-    for name, run in stored_runs(outputs_root()):
+    for name, run in stored:
         if isinstance(run, EvoexpError) or not run.failed():
             continue
         label = origin_of(run)["label"] or ""

@@ -1,7 +1,7 @@
 """`evoexp pack`: stored runs as one file, which other commands accept elsewhere.
 
-`report` and `compare` take its runs into the store; `show`, `diff` and `reproduce` only look into
-it.
+`report` and `compare` take its runs into the store; `show`, `list`, `diff`, `verify` and
+`reproduce` only look into it.
 """
 
 import argparse
@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from evoexp.commands.arguments import is_override
 from evoexp.commands.console import say
 from evoexp.commands.stored_runs import stored_run
 from evoexp.errors import NothingStored, UnknownHash, printable
@@ -41,7 +42,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 def is_archive(word: str) -> bool:
     """Return whether a word of a command is an archive of runs."""
-    return word.endswith(ENDING) and Path(word).is_file()
+    return word.endswith(ENDING) and not is_override(word)
 
 
 def in_archive(word: str) -> tuple[Path, str] | None:

@@ -121,7 +121,8 @@ def _print_screens(
             say(as_yaml({"settings": facts["settings"]}))
             if run is not None:
                 heads, last = right(*REPLICATE.values()), "digest, or why it failed"
-                table = new_table(f"replicates in {run.path}", *heads, last)
+                place = facts["origin"]["directory"]
+                table = new_table(f"replicates in {place}", *heads, last)
                 for row in summary_table(run).to_pylist():
                     cells = ["–" if row[k] is None else _said(row[k]) for k in REPLICATE]
                     table.add_row(*cells, row["digest"] or row["stop_reason"])

@@ -9,7 +9,9 @@ from pathlib import Path
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
+from evoexp.commands.pack import in_archive, looked_into
 from evoexp.commands.stored_runs import stored_run
+from evoexp.errors import printable
 from evoexp.store.identity import CONFIG
 from evoexp.store.integrity import DELETE, LogCheck, RunCheck, check_log, check_run
 from evoexp.store.run_directory import COMMAND, outputs_root, run_names
@@ -24,21 +26,28 @@ RUN_KEYS = [name for name in RunCheck._fields if name != "run"]
 def main(arguments: argparse.Namespace) -> int:
     """Check; exit code 1 if anything is damaged. Nothing is written."""
     outputs = outputs_root()
+    archives = {word: packed for word in arguments.hashes if (packed := in_archive(word))}
     names: list[str] = []
     for prefix in arguments.hashes:  # whatever is damaged in the run
-        own = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
-        names += own if len(own) == 1 else [stored_run(prefix).hash12]
-    names = names or run_names(outputs)
-    checks = [check_run(outputs, name) for name in dict.fromkeys(names)]
+        if prefix not in archives:
+            own = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
+            names += own if len(own) == 1 else [stored_run(prefix).hash12]
+    if not arguments.hashes:
+        names = run_names(outputs)
     with plain_console().status("checking logs"):
-        logs_of = _all_logs(checks)
-        found = [_checked(each, logs_of[each.hash]) for each in checks]
+        found = _checked_runs([check_run(outputs, name) for name in dict.fromkeys(names)])
+        for packed in archives.values():
+            with looked_into(*packed) as runs:
+                checks = [check_run(run.path.parents[1], run.hash12) for run in runs]
+                # no command mends an archive
+                found += [each._replace(mend="") for each in _checked_runs(checks)]
+    places = [str(outputs)] * bool(names) + [printable(word) for word in archives]
     damaged = [run for run in found if run.problems]
     if arguments.json:
         print_json([{name: getattr(run, name) for name in RUN_KEYS} for run in found])
         return 1 if damaged else 0
     if damaged:
-        title = f"damaged runs in {outputs}"
+        title = f"damaged runs in {', '.join(places)}"
         table = new_table(title, hash_column("run"), *right("logs"), "damaged files")
         for run in damaged:
             lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
@@ -58,6 +67,11 @@ def main(arguments: argparse.Namespace) -> int:
     found_in = f"{problems} damaged file{'s' * (problems > 1)} in {len(damaged)} of them"
     say(f"{len(found)} runs, {logs} logs: {found_in if damaged else 'all is well'}")
     return 1 if damaged else 0
+
+
+def _checked_runs(checks: Sequence[RunCheck]) -> list[RunCheck]:
+    logs_of = _all_logs(checks)
+    return [_checked(each, logs_of[each.hash]) for each in checks]
 
 
 def _all_logs(runs: Sequence[RunCheck]) -> dict[str, list[LogCheck]]:

@@ -47,7 +47,7 @@ def test_tables_sort_by_number(opened: Browser) -> None:
 
 
 def test_a_figure_grows_on_click(opened: Browser) -> None:
-    size = "document.querySelector('a.picture img').getBoundingClientRect().width"
+    size = "document.querySelector('figure a.picture img').getBoundingClientRect().width"
     assert opened.run(size) == pytest.approx(192.0)  # 144 points
     opened.run("document.querySelector('a.picture').click()")
     assert opened.run("document.getElementById('zoom').open") is True
@@ -57,7 +57,7 @@ def test_a_figure_grows_on_click(opened: Browser) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 1280])
+@pytest.mark.parametrize("width", [360, 390, 1280])
 def test_a_page_never_scrolls_sideways(
     browser: Browser, tmp_path: Path, width: int, scheme: str
 ) -> None:
@@ -65,6 +65,11 @@ def test_a_page_never_scrolls_sideways(
     browser.look(width, 900, scheme)
     browser.open((folder / "index.html").as_uri(), "true")
     assert browser.run("document.documentElement.scrollWidth") <= width
+    wide = "[...document.querySelectorAll('.scroll')].some(e => e.scrollWidth > e.clientWidth)"
+    assert width < 1280 or not browser.run(wide)
+    assert (
+        browser.run("document.querySelector('.shown a.picture').getBoundingClientRect().top") < 800
+    )
     assert len(browser.screenshot()) > 10_000
     assert browser.complaints == []
     assert not [url for url in browser.requests if not url.startswith(("data:", "file:"))]

@@ -80,7 +80,8 @@ def test_texts_of_strangers_are_only_text_and_read_back(text: str, tmp_path: Pat
     (tmp_path / "index.html").write_bytes(content)
     found = read_summary(tmp_path)
     assert (found.title, found.command, found.partial) == (text, f"report {text}", text)
-    assert (found.claims, found.runs) == (((text, "reproduced"),), ((HASH, text),))
+    assert (found.claims, found.questions) == (((text, "reproduced"),), ())
+    assert found.runs == ((HASH, text),)
     assert (found.failed, found.picture) == (1, "figure.svg")
 
 
@@ -114,10 +115,40 @@ def test_heads_that_name_a_condition_link_to_its_run() -> None:
 
 def test_a_motion_is_played_inside_the_figure_that_shows_it() -> None:
     page = read()
-    (frame,) = page.all("iframe")
+    first, frame = page.all("iframe")
     figure, after = page.all("figure")[0], page.all("section", id="failures")[0]
-    order = [page.elements.index(each) for each in (figure, frame, after)]
+    order = [page.elements.index(each) for each in (first, figure, frame, after)]
     assert order == sorted(order) and frame.attributes["src"] == "motion_1.html"
+    assert first.attributes["src"] == "motion_1.html#again"  # plays in the first screen
+
+
+def test_a_page_begins_with_its_answers() -> None:
+    """A sentence, a word and a number per claim; its evidence, and what is long, unfolds."""
+    verdicts = [
+        Verdict("reproduced", "A12 0.8"),
+        Verdict("depends on the reading (reproduced under 11 of 12)", "A12 0.7"),
+        *[Verdict("undecided", "n = 20", is_ours=True)] * 4,
+    ]
+    rows = tuple((f"claim {k}", verdict, f"so {k}") for k, verdict in enumerate(verdicts))
+    tables = (
+        Table("Wide", tuple("abcdefg"), (tuple(range(7)),)),
+        Table("Claims", tuple("abc"), rows),
+    )
+    page = read(PLAIN._replace(results=tables, introduction="It is. Eq. 3 i.e. so. More of it."))
+    assert [each.text for each in page.all("p", class_="introduction")] == ["It is. Eq. 3 i.e. so."]
+    deciding = [each.text for each in page.all("span", class_="deciding")]
+    assert deciding == ["A12 0.8", "reproduced under 11 of 12", *["n = 20"] * 4]
+    (counts,) = page.all("p", class_="counts")
+    assert " ".join(counts.text.split()).endswith("Our questions: 4 undecided")
+    assert [each.text.split("\n")[0] for each in page.all("details", class_="more")] == [
+        "moreMore of it.",
+        "1 more",
+    ]
+    (picture, *_) = page.all("a", class_="picture")
+    places = [page.all("ul", class_="claims")[0], picture, page.all("table", class_="sortable")[0]]
+    order = [page.elements.index(each) for each in places]
+    assert order == sorted(order)
+    assert [each.text for each in page.all("details", class_="columns")] == ["all 7 columns"]
 
 
 @pytest.mark.parametrize(
@@ -173,7 +204,13 @@ def test_a_report_in_html_says_what_it_says_in_markdown(
     content, text = (folder / "index.html").read_bytes(), (folder / "index.md").read_text()
     page = Page(content)
     page.check(folder)
-    assert page.tables() == markdown_tables(text)
+    claims, *tables = markdown_tables(text)
+    assert page.tables() == tables
+    shown_claims = page.all("ul", class_="claims")
+    sentences = [each.text for each in page.all("span", class_="sentence")]
+    assert sentences == [row[0] for row in claims[1:]]
+    evidence = " ".join(" ".join(each.text for each in shown_claims).split())
+    assert all(cell in evidence for row in claims[1:] for cell in row)
     headings = [line.lstrip("# ") for line in text.splitlines() if line.startswith("#")]
     shown = [e.text for e in page.elements if e.tag in ("h1", "h2", "h3")]
     assert [markdown.inert(each) for each in shown] == [*headings, "Runs, logs, commands"]
@@ -191,7 +228,8 @@ RUN = StoredRun(HASH, "rana_planar", "GA", "paper", 3, 20, 0)
 def summary(folder: str, command: str = "", picture: str = "") -> ReportSummary:
     headings = (("Claims", "claims"), ("GA against others", "ga-against-others"))
     words, runs = command or f"report {folder}", ((HASH, "GA"),)
-    return ReportSummary(folder, f"about {folder}", words, "", 0, headings, CLAIMS, runs, picture)
+    about, ours = f"about {folder}", (("ours", "undecided"),)
+    return ReportSummary(folder, about, words, "", 0, headings, CLAIMS, ours, runs, picture)
 
 
 def test_a_card_counts_the_claims_of_whole_experiments() -> None:
@@ -199,7 +237,9 @@ def test_a_card_counts_the_claims_of_whole_experiments() -> None:
     found = [summary(folder, picture=picture) for folder, picture in pictures.items()]
     found.append(summary("rana_three@smoke"))
     (card,) = site(found, [RANA], [])["papers"]
-    assert card["counts"] == (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
+    counts = (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
+    ours = (("undecided", 1),)
+    assert card["tallies"] == (("The paper's sentences", counts), ("Our questions", ours))
     assert (card["unjudged"], card["missing"]) == (3, ["rana_puma"])
     assert card["face"].picture_url == "rana_planar/fig_5.svg"
     assert card["reports"] == found
@@ -209,10 +249,16 @@ def test_a_card_counts_the_claims_of_whole_experiments() -> None:
 def test_reports_of_no_paper_stand_by_themselves() -> None:
     compared = summary("compare_rana_planar", "compare rana_planar")
     others = site([summary("arena_rana"), compared, summary("ranaplanar")], [RANA], [])["others"]
-    assert {name: [report.folder for report in reports] for name, reports in others} == {
-        "Arenas and other experiments": ["arena_rana", "ranaplanar"],
-        "Comparisons": ["compare_rana_planar"],
-    }
+    assert [(name, [each.folder for each in own], not_run) for name, own, not_run in others] == [
+        ("Arenas and other experiments", ["arena_rana", "ranaplanar"], ["lavoie"]),
+        ("Comparisons", ["compare_rana_planar"], []),
+    ]
+
+
+def test_an_experiment_that_was_not_run_says_its_command() -> None:
+    page = Page(home_page([summary("rana_planar")], [RANA], []))
+    commands = [each.text for each in page.all("code", class_="copy")]
+    assert commands == [f"evoexp run experiment={name}" for name in ("rana_puma", "lavoie")]
 
 
 @pytest.mark.parametrize(
@@ -229,7 +275,8 @@ def test_a_run_has_a_state(done: int, planned: int, failed: int, damage: str, st
     run = RUN._replace(done=done, planned=planned, failed=failed, damage=damage)
     page = Page(home_page([summary("rana_planar")], [RANA], [run]))
     cells = dict(zip(*page.tables()[0], strict=True))
-    assert (cells["hash"], cells["state"], cells["done"]) == (HASH, state, str(done))
+    counts = "" if damage else f": {done} of {planned}" + f", {failed} failed" * bool(failed)
+    assert (cells["hash"], cells["replicates"]) == (HASH, state + counts)
     assert cells["reports"] == "rana_planar"
     assert f"rana_planar/index.html?home#run-{HASH}" in page.addresses()
     assert ("not finished" in page.all("main")[0].text) == (state != "done")
@@ -250,7 +297,7 @@ def test_the_search_knows_titles_headings_claims_and_hashes() -> None:
     assert [(each["kind"], each["text"]) for each in entries] == [
         ("report", "about rana_planar"),
         ("heading", "GA against others"),
-        *((f"claim, {verdict}", text) for text, verdict in CLAIMS),
+        *((f"claim, {verdict}", text) for text, verdict in (*CLAIMS, ("ours", "undecided"))),
         ("run", f"{HASH} GA"),
     ]
     assert entries[1]["url"] == "rana_planar/index.html?home#ga-against-others"
@@ -260,7 +307,7 @@ def test_the_search_knows_titles_headings_claims_and_hashes() -> None:
 def test_texts_of_strangers_are_only_text_at_home(text: str) -> None:
     pairs, runs = ((text, text),), ((HASH, text),)
     folder = text.replace("/", "")
-    hostile = ReportSummary(folder, text, text, text, 1, pairs, pairs, runs, "figure.svg")
+    hostile = ReportSummary(folder, text, text, text, 1, pairs, pairs, pairs, runs, "figure.svg")
     run = RUN._replace(experiment=text, label=text, budget=text)
     paper = Paper("rana", text, text, (f"rana_{text}",), {})
     page = Page(home_page([hostile], [paper], [run]))

@@ -382,6 +382,8 @@
   }
   const cards = motions.map(card);
 
+  const again = location.hash === "#again";  // at the top of a report: small, and over and over
+  document.body.classList.toggle("small", again);
   let pending = false;
   function show() { if (!pending) { pending = true; requestAnimationFrame(draw); } }
   function draw(stamp) {
@@ -389,7 +391,7 @@
     if (state.playing) {
       if (state.last !== null) state.share += (stamp - state.last) / 1000 / DURATION * Number($("speed").value);
       state.last = stamp;
-      if (state.share >= 1) { state.share = 1; play(false); }
+      if (state.share >= 1) { state.share = again ? 0 : 1; play(again); }
       show();
     }
     $("time").value = state.share;
@@ -443,7 +445,7 @@
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
   const asked = /[#&]t=([\d.]+)/.exec(location.hash);  // page.html#t=0.5 stands still half way
   play(false);
-  const still = window.parent !== window || matchMedia("(prefers-reduced-motion: reduce)").matches;  // within a report it waits
+  const still = window.parent !== window && !again || matchMedia("(prefers-reduced-motion: reduce)").matches;  // within a report it waits
   if (asked) jump(Number(asked[1])); else if (!still) play(true);
   window.motionPage = { jump, play, state, motions, picture: k => { draw(0); return cards[k].view.canvas.toDataURL(); } };
 })();

@@ -54,6 +54,7 @@ def home_files() -> ReportFiles:
             continue
         origin = origin_of(run)
         experiment, label, budget = (str(origin[key] or "") for key in ORIGIN)
+        budget += ", changed" * bool(budget and origin["changed"])
         counts = len(run.completed()), run.num_planned(), len(run.failed())
         runs.append(StoredRun(name, experiment, label, budget, *counts))
     if not found and not runs:

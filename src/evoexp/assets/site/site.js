@@ -86,9 +86,7 @@
     const back = element("a", { href: "../index.html", className: "home" }, "← all reports");
     document.querySelector("nav.side").prepend(back);
   }
-  if (innerWidth < 980) {  // on a telephone pages begin with their text, and a player takes the screen when it is asked for
-    for (const each of document.querySelectorAll("nav.side details, details.motion")) each.open = false;
-  }
+  if (innerWidth < 980) for (const each of document.querySelectorAll("nav.side details")) each.open = false;  // a telephone's page begins with its text
 
   // search
   const field = document.getElementById("search"), index = document.getElementById("search-index");

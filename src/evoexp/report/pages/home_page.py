@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from pydantic import Field, TypeAdapter
 
-from evoexp.report.pages.html_page import HTML, script_json, telling_rank, verdict_counts, written
+from evoexp.report.pages.html_page import HTML, script_json, tallies, telling_rank, written
 
 MAX_LINKS = 3  # reports named beside a run
 FROM_HOME = "?home"  # tells a report that it can link back
@@ -32,7 +32,8 @@ class ReportSummary(NamedTuple):
     failed: int = 0  # number of failed replicates
     # (text, place on the page) of its sections and figures
     headings: tuple[tuple[str, str], ...] = ()
-    claims: tuple[tuple[str, str], ...] = ()  # (text, verdict)
+    claims: tuple[tuple[str, str], ...] = ()  # (text, verdict) of the paper's sentences
+    questions: tuple[tuple[str, str], ...] = ()  # (text, verdict) of questions of ours
     runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
     picture: Picture = ""  # the figure that shows best what it is about; empty if there is none
 
@@ -123,7 +124,10 @@ def home_page(
         entries = [
             ("report", each.title, ""),
             *(("heading", text, place) for text, place in each.headings if text not in USUAL),
-            *((f"claim, {verdict}", text, "claims") for text, verdict in each.claims),
+            *(
+                (f"claim, {verdict}", text, "claims")
+                for text, verdict in (*each.claims, *each.questions)
+            ),
             *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
         ]
         search += [
@@ -144,16 +148,20 @@ def site(
     }
     of_papers = {each.folder for several in owned.values() for each in several}
     others = [each for each in found if each.folder not in of_papers]
-    groups = {
-        "Arenas and other experiments": [each for each in others if not each.is_comparison],
-        "Comparisons": [each for each in others if each.is_comparison],
-    }
+    drawn = {each.experiment for each in others if not each.is_comparison}
+    names = {name for paper in papers for name in paper.experiments}
+    elsewhere = {name for name in names if not any(paper.has(name) for paper in papers)}
+    arenas = [each for each in others if not each.is_comparison]
+    groups: tuple[tuple[str, list[ReportSummary], list[str]], ...] = (
+        ("Arenas and other experiments", arenas, sorted(elsewhere - drawn)),
+        ("Comparisons", [each for each in others if each.is_comparison], []),
+    )
     return {
         "num_reports": len(found),
         "partial": [each for each in found if each.partial],
         "unfinished": sum(run.state != "done" for run in runs),
         "papers": [_card(paper, owned[paper.name]) for paper in papers],
-        "others": [item for item in groups.items() if item[1]],
+        "others": [group for group in groups if group[1] or group[2]],
         "runs": [
             (run, [each for each in found if run.hash12 in dict(each.runs)][:MAX_LINKS])
             for run in runs
@@ -174,7 +182,10 @@ def _card(paper: Paper, reports: Sequence[ReportSummary]) -> dict[str, Any]:
             key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
             default=None,
         ),
-        "counts": verdict_counts(verdict for each in whole for _, verdict in each.claims),
+        "tallies": tallies(
+            [claim for each in whole for claim in each.claims],
+            [claim for each in whole for claim in each.questions],
+        ),
         # claims of experiments without a report at the paper's budget
         "unjudged": sum(count for name, count in paper.claims.items() if name not in drawn),
         "reports": reports,

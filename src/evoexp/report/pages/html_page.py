@@ -15,6 +15,9 @@ from evoexp.report.pages.page_parts import Document, Table, Verdict
 
 HTML = "index.html"
 FEW = 3  # failures named at the top
+FEW_CLAIMS = 5  # shown at the top before the others unfold
+FEW_SENTENCES = 2  # of an introduction, likewise
+FEW_COLUMNS = 6  # of a table, likewise
 PIXELS_PER_POINT = 4.0 / 3.0
 # first words of verdicts, in order
 VERDICTS = ("reproduced", "practically", "depends", "contradicted", "undecided", "not")
@@ -22,7 +25,8 @@ TELLING = ("snapshot", "scene", "motion", "stages", "operational", "posture", "p
 """Parts of the names of figures that show what an experiment is about, the best one first."""
 NO_VALUE = ("–", "")  # cells of a column of numbers that hold none
 LONGEST_NUMBER = 48  # characters of a cell that is still a number, with its interval and unit
-_SIZE = re.compile(rb'<svg [^>]*?height="([\d.]+)pt"[^>]*? width="([\d.]+)pt"')
+_SIZES = [re.compile(rb'<svg [^>]*?\b%s="([\d.]+)pt"' % side) for side in (b"width", b"height")]
+_SENTENCE = re.compile(r"(?<=[.!?]) (?=[A-Z])")
 _NUMBER = re.compile(r"[-−]?(\d[\d.]*(e[-+−]?\d+)?|∞)($|[ \[%°])")
 _HASH = re.compile("<code>([0-9a-f]{12})</code>")
 _COUNT = re.compile(r"\s\(n\s=\s\d+\)")  # behind a condition in the head of a table
@@ -36,28 +40,39 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
     sections = tuple(_places(document, pictures))
     figures = [figure for section in sections for figure in section["figures"]]
     headings = [(section["heading"], section["anchor"]) for section in sections]
+    with_picture = [each for each in figures if each["file"]]
+    face = min(with_picture, key=lambda each: telling_rank(each["file"]), default=None)
+    played = [run.key for each in (face, *figures) if each for run in each["figure"].plays]
+    cells = [(str(row[0]), cell) for row in document.rows_below(CLAIMS) for cell in row]
+    claims = [(text, cell) for text, cell in cells if isinstance(cell, Verdict)]
+    sentences = [(text, verdict.text) for text, verdict in claims if not verdict.is_ours]
+    questions = [(text, verdict.text) for text, verdict in claims if verdict.is_ours]
+    introduction = _SENTENCE.split(document.introduction)
     summary = {  # that the page carries for the home page
         "title": document.title,
         "command": document.command.removeprefix("evoexp "),
         "partial": dict(document.notices).get("Partial results", ""),
         "failed": sum(run.failed for run in document.runs),
         "headings": [*headings, *((each["figure"].title, each["anchor"]) for each in figures)],
-        "claims": [
-            [str(row[0]), cell.text]
-            for row in document.rows_below(CLAIMS)
-            for cell in row
-            if isinstance(cell, Verdict)
-        ],
+        "claims": sentences,
+        "questions": questions,
         "runs": [[run.hash12, run.label] for run in document.runs],
-        "picture": min(
-            (each["file"] for each in figures if each["file"]), key=telling_rank, default=""
-        ),
+        "picture": face["file"] if face else "",
     }
     return written(
         "report_page.html",
         {run.hash12: run.label for run in document.runs},
         document=document,
         sections=sections,
+        introduction=[
+            " ".join(introduction[:FEW_SENTENCES]),
+            " ".join(introduction[FEW_SENTENCES:]),
+        ],
+        tallies=tallies(sentences, questions),
+        claims_heading=CLAIMS,
+        few_claims=FEW_CLAIMS,
+        face=face,
+        motion=next((document.players[key] for key in played if key in document.players), None),
         run_logs=run_logs,
         failures=document.rows_below(FAILURES),
         failures_anchor=dict(headings).get(FAILURES, ""),
@@ -69,6 +84,15 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
 def telling_rank(name: str) -> int:
     """Return the place of a figure among those that tell what an experiment is about; 0: best."""
     return next((k for k, word in enumerate(TELLING) if word in name), len(TELLING))
+
+
+def tallies(
+    sentences: Iterable[Sequence[str]], questions: Iterable[Sequence[str]]
+) -> tuple[tuple[str, tuple[tuple[str, int], ...]], ...]:
+    """Return (whose claims, verdict counts) of a paper's (text, verdict) and of ours."""
+    whose = {"The paper's sentences": sentences, "Our questions": questions}
+    counted = ((name, verdict_counts(verdict for _, verdict in own)) for name, own in whose.items())
+    return tuple((name, counts) for name, counts in counted if counts)
 
 
 def verdict_counts(verdicts: Iterable[str]) -> tuple[tuple[str, int], ...]:
@@ -91,18 +115,16 @@ def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[dict[
         return slug if taken[slug] == 1 else f"{slug}--{taken[slug]}"
 
     def place(heading: str, table: Table | None) -> dict[str, Any]:
-        cells = (cell for row in table.rows for cell in row) if table else ()
-        verdicts = verdict_counts(cell.text for cell in cells if isinstance(cell, Verdict))
-        own: dict[str, Any] = {"heading": heading, "anchor": anchor(heading), "table": table}
-        return own | {"verdicts": verdicts, "figures": []}
+        return {"heading": heading, "anchor": anchor(heading), "table": table, "figures": []}
 
     yield from (place(table.heading, table) for table in document.results)
     if document.figures:
         section = place(FIGURES, None)
         for figure in document.figures:
             file = document.picture(figure, "svg", "png")
-            size = _SIZE.search(pictures.get(file, b"")[:2000])  # width and height [px]
-            pixels = size and [round(float(size[k]) * PIXELS_PER_POINT) for k in (2, 1)]
+            head = pictures.get(file, b"")[:2000]
+            sides = [side.search(head) for side in _SIZES]  # width and height [pt]
+            pixels = [round(float(side[1]) * PIXELS_PER_POINT) for side in sides if side]
             own = {"figure": figure, "anchor": anchor(figure.stem), "file": file, "size": pixels}
             section["figures"].append(own)
         yield section
@@ -130,6 +152,7 @@ def written(template: str, runs: Mapping[str, str] | None = None, **values: Any)
         .render(
             inline=lambda value: inline(str(value), known),
             label=label,
+            few_columns=FEW_COLUMNS,
             is_verdict=lambda value: isinstance(value, Verdict),
             verdict_class=verdict_class,
             number_columns=number_columns,

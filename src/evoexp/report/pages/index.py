@@ -6,7 +6,7 @@ from pathlib import Path
 
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_file import own_pages
-from evoexp.report.pages.page_parts import Document, Page, Player, Table, Verdict
+from evoexp.report.pages.page_parts import Claim, Document, Page, Player, Table, Verdict
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -18,6 +18,7 @@ WIDEST = 20  # conditions side by side; more stand one below the other
 MOST_NAMED = 4  # runs whose hashes a caption spells out
 LONGEST_NAME = 40  # letters of a table's heading in the name of its file
 BETWEEN = " · "  # the parts of a label of a problem and a planner
+OUR_QUESTION = "our question"  # begins the source of a claim that no paper makes
 CLAIMS, FIGURES, FAILURES = "Claims", "Figures", "Failures"  # headings
 
 
@@ -30,8 +31,7 @@ def document(
 ) -> Document:
     """Return the text of a page, with the players of motions by the keys of the played runs."""
     claims = (
-        (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
-        for c in page.claims
+        (c.text, _verdict(c), c.evidence, c.n or "–", c.rule or "–", c.source) for c in page.claims
     )
     failures = (
         (c.label, replicate, reason)
@@ -66,6 +66,14 @@ def document(
         tuple(settings.formats),
         players,
     )
+
+
+def _verdict(claim: Claim) -> Verdict:
+    """Return a claim's verdict with the number that decides it, or with how many were counted."""
+    number = f"n = {claim.n}" if claim.n not in ("", "–") else ""
+    if claim.size is not None:
+        number = f"{claim.size.name} {claim.size.value:.3g}"
+    return Verdict(claim.verdict, number, claim.source.startswith(OUR_QUESTION))
 
 
 def _numbered(tables: Iterable[Table], first: int) -> tuple[Table, ...]:

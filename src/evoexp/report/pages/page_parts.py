@@ -68,6 +68,8 @@ class Verdict(NamedTuple):
     """A cell of a table that holds the verdict on a claim."""
 
     text: str  # such as "reproduced", or "not judged (budget smoke)"
+    number: str = ""  # that decides it, with its name; empty: there is none
+    is_ours: bool = False  # whether the claim is a question of ours, no sentence of the paper
 
     def __str__(self) -> str:
         """Return the verdict as Markdown."""

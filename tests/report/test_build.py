@@ -116,7 +116,7 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
     rows += ["| `ga.crossover_rate` | 0.9 | – | paper: Tab. 1, cross_over_probability |"]
     rows += ["| `ga.population_size` | 12 | – | override |", "via-point GA against random search"]
     assert [row for row in rows if row not in text] == []
-    assert text.count("not judged (budget smoke)") == 9
+    assert text.count("not judged (budget smoke)") == 13
     assert re.search(r"C5 = [1-9]\d* of 20 instants", text)
     assert all((page.parent / link).is_file() for link in re.findall(r"\]\(([^)]+)\)", text))
     assert "Partial results" not in text

@@ -17,7 +17,7 @@ from evoexp.report.pages.page_parts import Document, Table
 
 PACKAGES = r"\usepackage{booktabs, array}"
 COLUMN, PAGE = 50, 104  # letters of \footnotesize on a line of one column, of both columns
-GAP = 1.7  # letters that the space between two columns of a table takes
+GAP = 1.2  # letters that the space between two columns of a table takes
 LINES = 50  # of \footnotesize on a page, beside the rules of a table
 ROW_GAP = 0.2  # lines of \footnotesize between two rows
 CAPTION = 70  # letters of a caption, as high as a line of \footnotesize
@@ -176,7 +176,7 @@ def _frame(widths: FloatArray, cells: Cells) -> tuple[list[str], list[str]]:
         columns.append(rf">{{\ragged{side}\arraybackslash\hspace{{0pt}}}}{width}")
     begin = [
         rf"\begin{{{name}}}",
-        r"\setlength{\belowcaptionskip}{4pt}\setlength{\tabcolsep}{3pt}"
+        r"\setlength{\belowcaptionskip}{4pt}\setlength{\tabcolsep}{2pt}"
         r"\setlength{\extrarowheight}{2pt}\centering\footnotesize",
         rf"\begin{{tabular}}{{{''.join(columns)}}}",
     ]

@@ -135,12 +135,13 @@ def page_claims(
     return list(PageBuilder(file, scope.inner(compared=compared)).claims(entry["claims"]))
 
 
-def smoke_report(outputs: Path, name: str) -> Path:
-    """Return the directory of a whole report."""
+def smoke_report(outputs: Path, name: str, **changed: Any) -> Path:
+    """Return the directory of a whole report; some settings of it may be changed."""
     smoke_results(outputs, name)
     experiment = smoke_experiment(name)
     request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
-    derived = build.derived(request, page_settings(name), outputs, experiment.num_replicates)
+    settings = page_settings(name).model_copy(update=changed)
+    derived = build.derived(request, settings, outputs, experiment.num_replicates)
     return build.write_report(derived).parent
 
 

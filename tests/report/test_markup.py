@@ -15,7 +15,7 @@ from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
 from evoexp.report.pages import markdown, motion_pictures
 from evoexp.report.pages.index import in_few_words, provenance
-from evoexp.report.pages.latex_tables import escaped, latex_tables
+from evoexp.report.pages.latex_tables import PACKAGES, escaped, latex_tables
 from evoexp.report.pages.page_parts import Document, Table, Verdict
 from report_samples import shown_run
 
@@ -154,16 +154,55 @@ def latex(table: Table) -> list[str]:
 def test_a_latex_table_has_caption_rows_columns_and_rules() -> None:
     lines = latex(TABLE)
     assert lines[0] == "% made by evoexp report x"
+    assert rf"% needs {PACKAGES}" in lines
     assert r"\caption{A \& B: Claims. Median a\_b. n = 20, seeds 0, 7; run 000000000000.}" in lines
     assert r"\label{tab:exp-1-claims}" in lines
     assert [line for line in lines if "rule" in line] == [r"\toprule", r"\midrule", r"\bottomrule"]
     assert lines[lines.index(r"\midrule") + 1 : lines.index(r"\bottomrule")] == [
         rf"{LONG} & $-$1.5 {{[}}$-$2, $\infty$] & reproduced \\",
-        r"50 \%\_x & -- & not judged \\",
+        r"50~\%\_x & -- & not judged \\",
     ]
     assert r"claim & $\lambda$ = 10 \& more & verdict \\" in lines
+    assert r"\begin{table*}" in lines  # too wide for one of two columns
+    sides, shares = layout(lines)
+    assert sides == ["right", "left", "right"]  # ragged: numbers stand to the right
+    assert 0.99 < sum(shares) <= 1.0 and shares[0] == max(shares)
+
+
+def layout(lines: list[str]) -> tuple[list[str], list[float]]:
+    """Return the ragged side and the share of the line of each column of a table."""
     (begin,) = (line for line in lines if line.startswith(r"\begin{tabular}"))
-    assert re.fullmatch(r"\\begin\{tabular\}\{p\{0\.4\\linewidth\}rl\}", begin)
+    column = r"\\ragged(\w+)\\arraybackslash\\hspace\{0pt\}\}p\{\\dimexpr (0\.\d{4})\\linewidth"
+    sides, shares = zip(*re.findall(column, begin), strict=True)
+    return list(sides), list(map(float, shares))
+
+
+def test_a_narrow_latex_table_stands_in_one_column() -> None:
+    lines = latex(Table("Costs", ("a", "b"), (("x", 1), ("y", 2)), file="a.tex"))
+    assert r"\begin{table}" in lines and sum(layout(lines)[1]) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("headers", "rows"),
+    [
+        (("name", "text"), [(f"row {k}", LONG * 2) for k in range(60)]),
+        (("name", *"abcdefghijklmnop"), [("row 0", *["0.002837 [0.001000,"] * 16)]),
+    ],
+)
+def test_a_latex_table_with_too_many_rows_or_columns_comes_in_parts(
+    headers: tuple[str, ...], rows: list[tuple[object, ...]]
+) -> None:
+    lines = latex(Table("Long", headers, tuple(rows), file="a.tex"))
+    count = lines.count(r"\toprule")
+    assert count > 1
+    labels = [line for line in lines if line.startswith(r"\label")]
+    assert labels == [
+        rf"\label{{tab:exp-1-long{'' if k == 1 else f'-{k}'}}}" for k in range(1, count + 1)
+    ]
+    assert sum(f"Part {k + 1} of {count}." in "".join(lines) for k in range(count)) == count
+    body = [line for line in lines if line.startswith("row ")]
+    assert list(dict.fromkeys(line.split(" & ")[0] for line in body)) == [row[0] for row in rows]
+    assert sum(line.count(" & ") for line in body) == sum(len(row) - 1 for row in rows)
 
 
 NINE = [(str(k), 2, k % 2) for k in range(9)]
@@ -190,8 +229,12 @@ def test_provenance(runs: list[tuple[str, int, int]], expected: str) -> None:
 @given(st.text(alphabet=st.sampled_from(r"""ab \{}$&#_%~^<>|"[]*'(ü""")))
 def test_escaped_names_hold_no_commands_but_ours(text: str) -> None:
     found = escaped(text)
+    found = found.replace(r"\allowbreak{}", "").replace(r"~\%", r"\%")
     words = "textbackslash|textasciitilde|textasciicircum|textless|textgreater|textbar"
     bare = re.sub(rf"\\(?:{words})\{{\}}|\\[{{}}$&#_%]|\{{[\[*]\}}", "", found)
     assert not set(bare) & set("\\{}$&#_%~^<>|[*"), (text, found)
     assert bare.count("a") == text.count("a") and bare.count("ü") == text.count("ü")
+    assert escaped('"typical size 5", 3 % of Fig. 6') == r"``typical size 5'', 3~\% of Fig.~6"
+    long_word = "scenario.obstacles.0.radius"
+    assert escaped(long_word) == r"scenario.\allowbreak{}obstacles.0.\allowbreak{}radius"
     assert escaped("via-point GA, x = 10 (given)") == "via-point GA, x = 10 (given)"

@@ -88,8 +88,8 @@ def test_list_and_verify_look_into_an_archive(
     evoexp: Evoexp, packed: Path, stored: Path, run: RunDirectory, tmp_path: Path
 ) -> None:
     one, two = find_runs(stored)[:2]
-    lines = evoexp("list", str(packed)).out.splitlines()
-    assert lines[0].strip() == f"runs in {packed}" and "experiments" not in lines
+    words = evoexp("list", str(packed)).text.split()
+    assert words[:3] == ["runs", "in", str(packed)] and "experiments" not in words
     listed = json.loads(evoexp("list", f"{packed}:{two.hash12}", "--json").out)
     assert listed["experiments"] == []
     assert [each["hash"] for each in listed["runs"]] == [two.condition_id]

@@ -169,7 +169,8 @@ def test_codings_are_compared_arm_by_arm() -> None:
     found = sweep(made_up(errors, "lavoie_coding"))
     start = "Real coding performs better than binary coding, judged by "
     verdicts = {claim.text.removeprefix(start): claim.verdict for claim in found}
-    assert len(verdicts) == 16  # two arms, two rates of binary mutation, stopped or not, two values
+    # two arms, two rates of binary mutation; position errors stopped or not, effort stopped alone
+    assert len(verdicts) == 12
     for pair, verdict in {
         "real against binary": REPRODUCED,
         "real against binary, pm per bit": EQUAL,
@@ -177,7 +178,8 @@ def test_codings_are_compared_arm_by_arm() -> None:
         "10-DOF, real against 10-DOF, binary": CONTRADICTED,
     }.items():
         assert verdicts[f"position error: {pair}"] == verdict
-        assert verdicts[f"evaluations to a solution: {pair}"] == EQUAL
+        effort = verdicts.get(f"evaluations to a solution: {pair}")
+        assert effort == (None if "never" in pair else EQUAL)
 
 
 def test_the_algorithm_is_compared_with_the_best_of_its_controls() -> None:

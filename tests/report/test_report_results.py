@@ -42,7 +42,7 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     assert costs[ga.best_replicate] == min(costs)
     solutions = logs[ga.best_replicate].solutions
     np.testing.assert_array_equal(ga.solutions[ga.best_replicate], solutions[-1].values)
-    np.testing.assert_array_equal(ga.first_solution, solutions[0].values)
+    np.testing.assert_array_equal(ga.first_solution(ga.best_replicate), solutions[0].values)
     assert len(ga.generations) == sum(len(log.generations) for log in logs)
     assert ga.code["version"] == run.manifest()["versions"]["evoexp"]
     assert math.isnan(ga.spread("no such column").median)

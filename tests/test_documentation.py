@@ -30,7 +30,14 @@ PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").g
 MENU = ROOT / "scripts/mkdocs.yml"
 NOTEBOOK = ROOT / "docs/remake_a_figure.ipynb"
 RUN = {"bash": "commands", "python": "code", "sql": "queries"}  # languages of blocks that are run
-FILES = {"xml", "yaml", "csv", "ini", "python", "latex"}  # of blocks that are files: `title="…"` names each
+FILES = {
+    "xml",
+    "yaml",
+    "csv",
+    "ini",
+    "python",
+    "latex",
+}  # of blocks that are files: `title="…"` names each
 # Commands that the tests of this module leave out, each with the reason.
 LEFT_OUT = {
     "git clone": "only the reader knows the address",

@@ -31,6 +31,18 @@ def test_a_claim_is_traced_to_rule_numbers_and_n(evoexp: Evoexp, outputs: Path) 
     assert any("nodes as printed" in row["evidence"] for row in rows)
 
 
+def test_a_rule_is_listed_once_for_the_same_runs_by_who_was_run(evoexp: Evoexp) -> None:
+    """`rana` has the conditions of `rana_planar`; where it was not run, these are not hidden."""
+    for experiment, judging in (("rana_planar", "rana_planar"), ("rana", "rana")):
+        said = evoexp("run", f"experiment={experiment}", "num_replicates=1", "--no-report")
+        assert said.code == 0
+        rows = json.loads(evoexp("claims", "rana", "--json").out)
+        found = {r["experiment"] for r in rows if r["name"] == "margin_of_bodies"}
+        ran = {r["experiment"] for r in rows if r["verdict"] != "not run"}
+        assert judging in found & ran
+    assert "rana_planar" not in found
+
+
 @pytest.mark.parametrize("paper", registrations(CLAIMS), ids=lambda each: each.name)
 def test_every_experiment_that_a_rule_names_is_there(paper: Registration) -> None:
     for rule in registered_rules(paper).values():

@@ -71,9 +71,6 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
             if experiment == of_readings or of_readings not in rule.experiments
             if not ids <= judged.get(rule.name, set())
         ]
-        for name in own:
-            if experiment in rules[name].experiments:
-                judged.setdefault(name, set()).update(ids)
         try:
             request, settings, num_replicates = request_of(expanded, [])
             results = request.results(outputs_root(), num_replicates)
@@ -86,6 +83,9 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
                 if c.name in own or c.name not in rules
             ]
             command = f"evoexp report {experiment}"
+            for name in own:
+                if experiment in rules[name].experiments:
+                    judged.setdefault(name, set()).update(ids)
         except NothingStored:
             waiting = [r.about() for r in rules.values() if experiment in r.experiments]
             rows = [

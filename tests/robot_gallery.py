@@ -1,6 +1,6 @@
-"""Robots of the package example-robot-data, and a reach that each of them plans.
+"""Robots of the package example-robot-data and of their makers' packages, and reaches they plan.
 
-Used by the test of all of them and by `scripts/update-gallery`, which writes their page.
+Used by the test of the former and by `scripts/update-gallery`, which writes the page of all.
 """
 
 from collections.abc import Sequence
@@ -41,25 +41,29 @@ class GalleryRobot(NamedTuple):
     """A robot, and the joints of one of its arms."""
 
     name: str  # of the robot
-    path: str  # of its URDF in the package
+    path: str  # of its URDF in example-robot-data; of a maker's package that of its xacro or URDF
     joints: tuple[str, ...] = ()  # that move; none: all
     tool: str = ""  # frame of the tool, empty for the last one
     thickness: float = 0.06  # radius of the spheres by which `via_point_ga` tests its links [m]
     srdf: str = ""  # its SRDF in the package; empty: pairs of bodies are derived from samples alone
+    repository: str = ""  # on GitHub, of its maker's package; empty: example-robot-data
+    urdf: str = ""  # expanded from a maker's package
 
     @property
     def words(self) -> tuple[str, ...]:
         """Words of the command line that choose it."""
-        found = ["robot=urdf", f"robot.path={ROBOT_DATA}:{self.path}"]
+        found = ["robot=urdf", f"robot.path={self.urdf or f'{ROBOT_DATA}:{self.path}'}"]
         found += [f"robot.joints=[{','.join(self.joints)}]"] if self.joints else []
         found += [f"robot.srdf={ROBOT_DATA}:{self.srdf}"] if self.srdf else []
         return (*found, *([f"robot.tool_frame={self.tool}"] if self.tool else ()))
 
 
-ROBOTS = tuple(
+ALL = tuple(
     GalleryRobot(**row | {"joints": tuple(row.get("joints", ()))})
     for row in yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text())
 )
+ROBOTS = tuple(robot for robot in ALL if not robot.repository)
+MAKERS = tuple(robot for robot in ALL if robot.repository)
 
 
 class Reach(NamedTuple):

@@ -1,4 +1,4 @@
-"""CMA-ES and noisy trajectories on a planner's coding: each beside an obvious version of itself."""
+"""Controls on a planner's real coding: each beside an obvious version of itself."""
 
 import importlib.util
 from typing import Any
@@ -35,13 +35,14 @@ def test_vectors_are_the_numbers_that_differ_with_the_samples_mean_and_covarianc
     assert found.changes.shape == (4, 21)
     assert np.array_equal(found.changes, np.pad(np.ones((4, 19), bool), ((0, 0), (1, 1))))
     inner = drawn[:, 1:-1].reshape(76, 400)
-    assert found.mean == pytest.approx(inner.mean(axis=1))
+    distribution = found.distribution()
+    assert distribution.mean == pytest.approx(inner.mean(axis=1))
     covariance = np.cov(inner, bias=True)
     scale = np.trace(covariance) / 76
-    assert found.deviation == pytest.approx(np.sqrt(scale))
-    assert np.diag(found.covariance) == pytest.approx(np.diag(covariance) / scale)
+    assert distribution.deviation == pytest.approx(np.sqrt(scale))
+    assert np.diag(distribution.covariance) == pytest.approx(np.diag(covariance) / scale)
     apart = ~np.eye(76, dtype=bool)
-    assert found.covariance[apart] == pytest.approx(0.9 * covariance[apart] / scale)
+    assert distribution.covariance[apart] == pytest.approx(0.9 * covariance[apart] / scale)
     again = found.population(inner.T)
     assert np.array_equal(again, drawn)
 
@@ -51,7 +52,8 @@ def test_cma_es_is_the_package_told_the_planners_costs(improves: bool) -> None:
     chosen = control("cma_es", "ga.num_generations=12", f"control.improves={improves}")
     planner, problem = chosen.prepare()
     rng = np.random.default_rng(5)
-    start = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))
+    vectors = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))
+    start = vectors.distribution()
     plain = cmaes.CMA(
         start.mean,
         start.deviation,
@@ -73,17 +75,47 @@ def test_cma_es_is_the_package_told_the_planners_costs(improves: bool) -> None:
     assert record.evaluations == 13 * 48
 
 
+def test_chains_keep_what_a_step_and_a_local_search_make_cheaper() -> None:
+    chosen = control(
+        "iterated_local_search", "ga.num_generations=9", "control.sigma=1", "control.num_chains=5"
+    )
+    planner, problem = chosen.prepare()
+    rng = np.random.default_rng(4)
+    drawn = planner.sample(problem, rng, 1000)
+    first, *later = evolved(chosen, 4)
+    chains = [
+        (cost, s) for cost, s in zip(first.costs, planner.sample(problem, rng, 50).T, strict=True)
+    ]
+    chains = sorted(chains, key=lambda chain: chain[0])[:5]
+    for record in later:
+        one, other = rng.integers(1000, size=(2, 48))
+        sizes = 0.01 ** rng.random(48) / np.sqrt(2.0)
+        tried = [
+            chains[k % 5][1].T + s * (drawn[:, :, a] - drawn[:, :, b])
+            for k, (s, a, b) in enumerate(zip(sizes, one, other, strict=True))
+        ]
+        strings = planner.planner.improve(problem, np.stack(tried, axis=-1), rng)
+        costs = planner.cost(problem, strings).cost
+        assert record.costs == pytest.approx(costs)
+        for k in range(5):
+            best = min(range(k, 48, 5), key=lambda i: costs[i])
+            if costs[best] <= chains[k][0]:
+                chains[k] = costs[best], strings[:, :, best].T
+        assert record.best_cost == pytest.approx(min(cost for cost, _ in chains))
+
+
 def test_noisy_trajectories_move_by_their_weighted_mean() -> None:
     chosen = control("stomp", "ga.num_generations=15", "control.sensitivity=7")
     planner, problem = chosen.prepare()
     rng = np.random.default_rng(2)
-    start = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))
+    vectors = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))
+    start = vectors.distribution()
     root = np.linalg.cholesky(start.covariance) * start.deviation
     middle, sigma = start.mean, 0.5
     for record in evolved(chosen, 2):
         normals = standard_normal(rng, (48, 76))
         noise = [np.zeros(76), *(sigma * (root @ each) for each in normals[1:])]
-        strings = start.population(np.array([middle + each for each in noise]))
+        strings = vectors.population(np.array([middle + each for each in noise]))
         costs = planner.cost(problem, strings).cost
         assert record.costs == pytest.approx(costs)
         scaled = (costs - costs.min()) / (costs.max() - costs.min())

@@ -309,7 +309,7 @@ class _Check:
             self._refuse(f"one of {', '.join(SHAPES)} in a <geometry>", where, f"<{child.tag}>")
         known = PARTS.get(tag, [])
         meant = get_close_matches(child.tag.lower(), known, 1, ALIKE)
-        if meant and child.tag not in known:
+        if meant and child.tag not in ELEMENTS["others"]:
             hint = f"; did you mean '{meant[0]}'?"
             self._refuse(f"elements of a URDF in a <{tag}>", where, f"<{child.tag}>", hint)
         inside = [child] if tag == "robot" else child.iter()

@@ -36,7 +36,8 @@ class CmaEs(RealVectorControl):
         from cmaes import CMA
 
         planner = self.planner
-        start = real_vectors(planner, problem, planner.sample(problem, rng, self.num_drawn))
+        vectors = real_vectors(planner, problem, planner.sample(problem, rng, self.num_drawn))
+        start = vectors.distribution()
         optimizer: CMA | None = None
         for index in itertools.count():
             count = self.num_evaluations(index)
@@ -48,9 +49,9 @@ class CmaEs(RealVectorControl):
                     seed=int(rng.integers(SEEDS)),
                     population_size=count,
                 )
-            vectors = np.array([optimizer.ask() for _ in range(count)])
-            population = start.population(vectors)
+            asked = np.array([optimizer.ask() for _ in range(count)])
+            population = vectors.population(asked)
             improved = planner.improve(problem, population, rng) if self.improves else None
             judged = yield population if improved is None else improved
             ranked = np.where(np.isfinite(judged.cost), judged.cost, np.finfo(float).max)
-            optimizer.tell(list(zip(vectors, ranked.tolist(), strict=True)))
+            optimizer.tell(list(zip(asked, ranked.tolist(), strict=True)))

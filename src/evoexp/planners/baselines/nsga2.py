@@ -49,7 +49,7 @@ class Nsga2(RealVectorControl):
         planner, size = self.planner, self.num_evaluations(1)
         drawn = planner.sample(problem, rng, max(self.num_drawn, size))
         coding = real_vectors(planner, problem, drawn)
-        vectors = drawn[coding.changes].T
+        vectors = coding.drawn.T
         box = Problem(
             n_var=vectors.shape[1],
             n_obj=len(self.objectives),

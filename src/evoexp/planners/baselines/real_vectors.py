@@ -20,9 +20,7 @@ class RealVectors(NamedTuple):
     # an individual, individuals' axis left out; what is the same in all of them stays
     template: FloatArray
     changes: BoolArray  # of the same shape: which of its numbers are searched
-    mean: FloatArray  # (variables,) of the drawn individuals
-    covariance: FloatArray  # (variables, variables) of them, of mean variance 1
-    deviation: float  # root of the mean variance of the drawn individuals
+    drawn: FloatArray  # (variables, individuals) those of the drawn individuals
     # least and greatest values of an individual's numbers, each of the template's shape
     bounds: tuple[FloatArray, FloatArray]
 
@@ -33,6 +31,28 @@ class RealVectors(NamedTuple):
         low, high = (bound[..., None] for bound in self.bounds)
         return np.asarray(np.minimum(np.maximum(found, low), high))
 
+    def distribution(self) -> "Distribution":
+        """Return the normal distribution of the drawn individuals, shrunk towards its diagonal."""
+        count, diagonal = self.drawn.shape[1], np.eye(len(self.drawn), dtype=bool)
+        mean = matrix_product(self.drawn, np.ones(count)) / count
+        apart = self.drawn - mean[:, None]
+        covariance = matrix_product(apart, np.ascontiguousarray(apart.T)) / count
+        own = np.diag(covariance).copy()
+        variance = float(matrix_product(own, np.ones(len(own)))) / len(own)
+        covariance *= 1.0 - SHRINKAGE
+        least = np.maximum(own, LEAST * variance)
+        covariance[diagonal] = (1.0 - SHRINKAGE) * own + SHRINKAGE * least
+        covariance /= variance
+        return Distribution(mean, covariance, float(np.sqrt(variance)))
+
+
+class Distribution(NamedTuple):
+    """A normal distribution of vectors."""
+
+    mean: FloatArray  # (variables,)
+    covariance: FloatArray  # (variables, variables), of mean variance 1
+    deviation: float  # root of the mean variance
+
 
 class RealVectorControl(WrappedPlanner):
     """Base of the controls that search among the real vectors of a planner's individuals."""
@@ -40,7 +60,7 @@ class RealVectorControl(WrappedPlanner):
     matrices: ClassVar[int] = 1  # of (variables, variables) that a search keeps
     fewest: ClassVar[int] = 2  # individuals of a generation that a search takes
 
-    num_drawn: Count  # individuals drawn for the first vectors and their covariance; not judged
+    num_drawn: Count  # individuals drawn to know where vectors differ and how; not judged
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
@@ -72,19 +92,8 @@ def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
     if not vectors.size:
         must = "one whose first individuals differ"
         raise SettingError("planner", must, planner.component)
-    count, diagonal = vectors.shape[1], np.eye(len(vectors), dtype=bool)
-    mean = matrix_product(vectors, np.ones(count)) / count
-    apart = vectors - mean[:, None]
-    covariance = matrix_product(apart, np.ascontiguousarray(apart.T)) / count
-    # shrunk towards its diagonal, and divided by the mean variance
-    own = np.diag(covariance).copy()
-    variance = float(matrix_product(own, np.ones(len(own)))) / len(own)
-    covariance *= 1.0 - SHRINKAGE
-    least = np.maximum(own, LEAST * variance)
-    covariance[diagonal] = (1.0 - SHRINKAGE) * own + SHRINKAGE * least
-    covariance /= variance
     bounds = planner.bounds(problem)  # real-coded ones have them
-    return RealVectors(template, changes, mean, covariance, float(np.sqrt(variance)), bounds)
+    return RealVectors(template, changes, vectors, bounds)
 
 
 def transposed_root(matrix: FloatArray) -> FloatArray:

@@ -40,8 +40,9 @@ class Stomp(RealVectorControl):
         """Yield one generation of noisy trajectories after the other, the middle one first."""
         planner = self.planner
         vectors = real_vectors(planner, problem, planner.sample(problem, rng, self.num_drawn))
-        root, scale = transposed_root(vectors.covariance), vectors.deviation
-        middle, sigma, least, idle = vectors.mean, self.sigma, np.inf, 0
+        start = vectors.distribution()
+        root, scale = transposed_root(start.covariance), start.deviation
+        middle, sigma, least, idle = start.mean, self.sigma, np.inf, 0
         for index in itertools.count():
             if idle > self.patience:
                 middle = planner.sample(problem, rng, 1)[vectors.changes][:, 0]

@@ -11,7 +11,12 @@ from evoexp.errors import EvoexpError
 from evoexp.report.figures.effort_curves import share_table
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.best_known import BestKnown, parsed, read_best_known, shipped_best_known
+from evoexp.report.results.comparison_files import (
+    BestKnown,
+    parsed,
+    read_best_known,
+    shipped_best_known,
+)
 from evoexp.report.results.planner_runs import MULTIPLES, of_results, problem_key
 from evoexp.report.results.stored_results import Results
 

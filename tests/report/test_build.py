@@ -39,10 +39,11 @@ SPATIAL += ["fig_12b_configuration_space", "fig_12b_operational_space", "fig_13_
 def draw(outputs: Path, experiment: Experiment, page: str | None = "rana", *formats: str) -> Path:
     """Write a report; return its page in Markdown."""
     name, budget = experiment.report_name, experiment.budget
-    request = build.Request(name, experiment.name, budget, experiment.conditions)
     settings = ReportSettings(**REPORT | {"figures": page, "formats": formats or ("svg", "png")})
-    report = build.derived(request, settings, outputs, experiment.num_replicates)
-    return build.write_report(report).with_suffix(".md")
+    planned = experiment.conditions, settings, experiment.num_replicates
+    words = f"{experiment.name} budget={budget}"
+    request = build.Request(name, experiment.name, budget, *planned, words)
+    return request.write(outputs).with_suffix(".md")
 
 
 def contents(page: Path) -> dict[str, bytes]:

@@ -11,8 +11,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from evoexp.papers.rana.figures import planar_models, planar_motion
-from evoexp.report.figures import convergence, effects, shares, style
-from evoexp.report.figures.effects import draw_box
+from evoexp.report.figures import convergence, side_by_side, style
+from evoexp.report.figures.side_by_side import draw_box
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import Proportion
@@ -81,7 +81,7 @@ def values(*runs: list[float]) -> Axes:
         for n, value in enumerate(found)
     ]
     table = pd.DataFrame(parts).assign(quantity="evaluations", failed=0)
-    return effects.draw_values(table).axes[0]
+    return side_by_side.draw_values(table).axes[0]
 
 
 def medians(axes: Axes) -> list[float]:
@@ -94,9 +94,9 @@ def test_runs_that_never_get_there_count_in_the_box() -> None:
     axes = values([2.0, 3.0, 4.0, 5.0, 6.0], [2.0, 4.0, 6.0, np.inf, np.inf])
     assert medians(axes) == [4.0, 6.0]
     assert [text.get_text() for text in axes.texts] == ["5 of 5", "3 of 5", "never"]
-    assert axes.texts[-1].xy[0] == pytest.approx(6.0 + effects.BEYOND * 4.0)
+    assert axes.texts[-1].xy[0] == pytest.approx(6.0 + side_by_side.BEYOND * 4.0)
     some = values([np.inf] * 4, [1.0, *[np.inf] * 3])  # a median may be never
-    assert medians(some) == [pytest.approx(1.0 + effects.BEYOND)] * 2
+    assert medians(some) == [pytest.approx(1.0 + side_by_side.BEYOND)] * 2
     assert medians(values([np.inf] * 4)) == [1.0]
     axes = values([2.0, 3.0, 4.0])
     assert not axes.texts
@@ -120,7 +120,7 @@ def test_panels_of_shares_have_one_scale() -> None:
         ("low", 0, "a", Proportion(4, 200)),
         ("low", 1, "b", Proportion(0, 0)),
     ]
-    panels = shares.draw_shares(shares.shares_table(rows, {}, 0.95)).axes
+    panels = side_by_side.draw_shares(side_by_side.shares_table(rows, {}, 0.95)).axes
     (low, high), other = (axes.get_xlim() for axes in panels)
     assert (low, high) == other and low < 0.0 and high > 100.0
 

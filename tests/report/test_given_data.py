@@ -11,7 +11,7 @@ from evoexp.errors import SettingError
 from evoexp.report.figures.effort_curves import length_table, share_table
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.given_data import (
+from evoexp.report.results.comparison_files import (
     COLUMNS,
     GivenData,
     of_given,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.report.results.ioh_format import NO_ANSWER, ioh_files, run_rows
+from evoexp.report.results.comparison_files import NO_ANSWER, ioh_files, run_rows
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
 from evoexp.report.results.stored_results import Results
 from report_samples import made_up_runs

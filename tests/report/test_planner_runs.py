@@ -22,13 +22,16 @@ from evoexp.report.figures.effort_curves import (
 from evoexp.report.pages import comparison
 from evoexp.report.pages.comparison import Rated, as_csv
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import proven_answers
-from evoexp.report.results.planner_runs import MULTIPLES, PlannerRuns, Problem, of_results
-from evoexp.report.results.proven_answers import (
+from evoexp.report.results import planner_runs
+from evoexp.report.results.planner_runs import (
+    MULTIPLES,
     Answer,
+    PlannerRuns,
+    Problem,
     answer_table,
     answers_of,
     motion_length,
+    of_results,
     straight_line,
 )
 from evoexp.report.results.stored_results import Results, gather
@@ -110,8 +113,8 @@ def test_lengths_are_those_of_many_short_steps(seed: int) -> None:
 def test_answers_are_the_logged_improvements_judged(
     results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(proven_answers, "cache_root", lambda: tmp_path)  # judged anew
-    monkeypatch.setattr(proven_answers, "WORTH_WORKERS", 1)
+    monkeypatch.setattr(planner_runs, "cache_root", lambda: tmp_path)  # judged anew
+    monkeypatch.setattr(planner_runs, "WORTH_WORKERS", 1)
     together = answers_of(results.evolved)
     assert list(together) == [c.label for c in results.evolved]
     assert len([*(tmp_path / "answers").iterdir()]) == sum(c.done for c in results.evolved)

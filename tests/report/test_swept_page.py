@@ -13,10 +13,10 @@ import pytest
 
 from evoexp.cli import main
 from evoexp.configuration import compose
-from evoexp.report.figures import style, sweeps
+from evoexp.report.figures import convergence, style
 from evoexp.report.pages.page_builder import page_of
+from evoexp.report.pages.swept import labelled, main_effects, sweep_of
 from evoexp.report.results.stored_results import Results, gather
-from evoexp.report.results.swept_settings import main_effects, sweep_of
 from evoexp.shipped import shipped
 from report_samples import SMALL, can_be_drawn, page_settings, store
 
@@ -99,17 +99,17 @@ def test_only_common_seeds_are_paired() -> None:
 
 
 def test_grids_hold_every_combination(two_settings: Any) -> None:
-    table = sweeps.grid_table(two_settings, cost)
+    table = convergence.grid_table(two_settings, cost)
     cells = {(row.y, row.x): row.median for row in table.itertuples()}
     assert cells == {values: np.median(costs) for values, costs in COSTS.items()}
-    figure = style.drawn(lambda: sweeps.draw_grid(table, "cost"), ("svg",), 60)["svg"]
+    figure = style.drawn(lambda: convergence.draw_grid(table, "cost"), ("svg",), 60)["svg"]
     assert all(f">{value:.4g}<".encode() in figure for value in cells.values() if value < 100.0)
 
 
 def test_three_settings_have_a_panel_for_each_value_of_the_first() -> None:
     labels = [f"mode={m} · x={x} · y={y}" for m, x, y in itertools.product("ab", "12", "34")]
     sweep = sweep_of(fake([(label, [1.0, 2.0]) for label in labels]))
-    table = sweeps.grid_table(sweep, cost)
+    table = convergence.grid_table(sweep, cost)
     assert list(dict.fromkeys(table["panel"])) == ["mode = a", "mode = b"]
     assert (table["x_setting"] == "y").all() and (table["y_setting"] == "x").all()
 
@@ -126,8 +126,9 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Results:
 def test_convergence_has_a_panel_for_each_value_of_the_first_setting(
     swept: Results, two_settings: Any
 ) -> None:
-    assert sweeps.facets(two_settings) == [("GA", "ga.size = 20"), ("GA", "ga.size = 100")]
-    table = sweeps.convergence_table(swept, sweep_of(swept))
+    names = {labelled(two_settings, each.values[:-1]) for each in two_settings.conditions}
+    assert names == {"ga.size = 20", "ga.size = 100"}
+    table = convergence.facets_table(swept, sweep_of(swept))
     assert set(table["facet"]) == {""} and set(table["setting"]) == {"num_elites"}
     assert {(row.value, row.level) for row in table.itertuples()} == {("0", 0), ("2", 1)}
 

@@ -15,10 +15,17 @@ from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.claim_rules import KINDS, Rules, read_rules
 from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
 from evoexp.report.statistics.inference import Proportion, fisher_exact, runs_for_effect
-from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED, UNDECIDED, greater
+from evoexp.report.statistics.judging import (
+    CONTRADICTED,
+    KINDS,
+    REPRODUCED,
+    UNDECIDED,
+    Rules,
+    greater,
+    read_rules,
+)
 from report_samples import hearing, page_settings
 
 LOW = np.arange(12.0)

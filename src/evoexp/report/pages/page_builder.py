@@ -5,9 +5,9 @@ from functools import partial
 from typing import Any, cast
 
 from evoexp.report.pages import GENERIC, page_registration, swept
-from evoexp.report.pages.judged_entries import judged_as_written
+from evoexp.report.pages.judged_claims import Headline, judged_as_written
 from evoexp.report.pages.motion_pictures import best_motions
-from evoexp.report.pages.page_file import PageFile, own_pages, read_page_file
+from evoexp.report.pages.page_file import PageFile, Scope, own_pages, read_page_file
 from evoexp.report.pages.page_parts import (
     Claim,
     Drawing,
@@ -17,11 +17,9 @@ from evoexp.report.pages.page_parts import (
     Table,
     quantity,
 )
-from evoexp.report.pages.page_scope import Scope
-from evoexp.report.pages.readings import Headline
+from evoexp.report.pages.swept import sweep_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import sweep_of
 from evoexp.report.statistics.comparisons import (
     Comparison,
     FamilyComparison,

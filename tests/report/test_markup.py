@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from evoexp.commands.console import coloured, new_table, plain_console
 from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
-from evoexp.report.pages import markdown, motion_pictures
+from evoexp.report.pages import markdown, page_values
 from evoexp.report.pages.index import in_few_words, provenance
 from evoexp.report.pages.latex_tables import PACKAGES, escaped, latex_tables
 from evoexp.report.pages.page_parts import Document, Table, Verdict
@@ -92,7 +92,7 @@ def shown(label: str, *notes: str) -> Any:
 
 def test_equal_notes_on_conditions_stand_in_one_row() -> None:
     first = shown("I", "covers", "pairs"), shown("I", "covers")
-    found = motion_pictures.notes([*first, shown("II", "covers"), shown("III")])
+    found = page_values.notes([*first, shown("II", "covers"), shown("III")])
     assert found == (("I, II", "robot: covers"), ("I", "robot: pairs"))
 
 

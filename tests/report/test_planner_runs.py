@@ -19,17 +19,7 @@ from scipy.interpolate import CubicSpline
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report.figures.effort_curves import (
-    critical_difference_table,
-    draw_critical_difference,
-    draw_profiles,
-    draw_shares,
-    draw_shares_by_problem,
-    length_table,
-    problem_share_table,
-    profiles_table,
-    share_table,
-)
+from evoexp.report.figures import effort_curves
 from evoexp.report.pages import comparison
 from evoexp.report.pages.comparison import Rated, as_csv
 from evoexp.report.report_settings import ReportSettings
@@ -153,7 +143,10 @@ def test_answers_are_the_logged_improvements_judged(
 
 def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results: Results) -> None:
     runs = of_results(results.evolved)
-    table, lengths = share_table(runs), length_table(runs).groupby("planner")["median"].last()
+    table, lengths = (
+        effort_curves.share_table(runs),
+        effort_curves.length_table(runs).groupby("planner")["median"].last(),
+    )
     for own, condition in zip(runs, results.evolved, strict=True):
         assert lengths[own.label] == pytest.approx(np.median(own.best_lengths))
         answers = own.table[own.table["certified"]]
@@ -164,20 +157,24 @@ def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results
             good = answers[answers["collision_queries"] <= x].groupby("replicate")["length"].min()
             count = (good.to_numpy()[:, None] <= targets).sum()
             assert share == pytest.approx(count / curve["targets"].iloc[0])
-    labels = [str(line.get_label()) for line in draw_shares(table).axes[0].get_lines()]
+    labels = [
+        str(line.get_label()) for line in effort_curves.draw_shares(table).axes[0].get_lines()
+    ]
     assert [label.partition(" (")[0] for label in labels] == [own.label for own in runs]
 
 
 def test_shares_of_all_problems_are_the_mean_of_those_of_each(both: Results) -> None:
     runs = of_results(both.evolved)
-    table = problem_share_table(runs).astype({"collision_queries": float, "share": float})
-    pooled = share_table(runs, table["collision_queries"].unique()).groupby("planner")
+    table = effort_curves.problem_share_table(runs).astype(
+        {"collision_queries": float, "share": float}
+    )
+    pooled = effort_curves.share_table(runs, table["collision_queries"].unique()).groupby("planner")
     for planner, own in table.groupby("planner"):
         weighted = (own["share"] * own["targets"]).groupby(own["collision_queries"]).sum()
         total = own.groupby("problem")["targets"].first().sum()
         shown = pooled.get_group(planner)["share"].astype(float)
         assert np.allclose(weighted.to_numpy() / total, shown)
-    axes = draw_shares_by_problem(table).axes
+    axes = effort_curves.draw_shares_by_problem(table).axes
     titles = [each.get_title(loc="left") or each.get_title() for each in axes]
     assert titles == list(table["problem"].unique())
     assert len({each.get_xlim() for each in axes}) == 1
@@ -300,7 +297,7 @@ def test_profiles_count_problems(efforts: np.ndarray) -> None:
     ratios = effort_ratios(efforts)
     for (i, j), effort in np.ndenumerate(efforts):
         assert ratios[i, j] == (np.inf if np.isinf(effort) else effort / efforts[i].min())
-    table = profiles_table(stands(efforts))
+    table = effort_curves.profiles_table(stands(efforts))
     for row in table.itertuples():
         own = ratios[:, int(str(row.planner).removeprefix("planner "))]
         assert row.share == sum(ratio <= row.ratio for ratio in own) / len(own)
@@ -379,11 +376,11 @@ def test_figures_name_every_planner() -> None:
     rng = np.random.default_rng(3)
     found = stands(rng.random((8, 7)), rng.random((8, 7)))
     assert found.can_be_tested
-    table = critical_difference_table(found, 0.05)
+    table = effort_curves.critical_difference_table(found, 0.05)
     assert table["mean_rank"].is_monotonic_increasing
-    (axes,) = draw_critical_difference(table).axes
+    (axes,) = effort_curves.draw_critical_difference(table).axes
     texts = " ".join(text.get_text() for text in axes.texts)
     assert all(name in texts for name in found.planners)
-    (axes,) = draw_profiles(profiles_table(found)).axes
+    (axes,) = effort_curves.draw_profiles(effort_curves.profiles_table(found)).axes
     labels = [str(line.get_label()) for line in axes.get_lines()]  # of the ways to names: "_…"
     assert [label for label in labels if not label.startswith("_")] == list(found.planners)

@@ -12,14 +12,7 @@ from evoexp.condition import Condition
 from evoexp.configuration.labels import SAME
 from evoexp.errors import SettingError
 from evoexp.report.pages import build, comparison, markdown
-from evoexp.report.results.comparison_files import (
-    ioh_files,
-    of_given,
-    read_best_known,
-    read_given,
-    shipped_best_known,
-    strange_problems,
-)
+from evoexp.report.results import comparison_files
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
 from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root
@@ -41,7 +34,9 @@ def main(arguments: argparse.Namespace) -> int:
         (latex,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
         write_file(Path(arguments.latex), latex)
     if arguments.ioh:
-        written = {folder / name: content for name, content in ioh_files(runs).items()}
+        written = {
+            folder / name: content for name, content in comparison_files.ioh_files(runs).items()
+        }
         for path in written:
             path.parent.mkdir(parents=True, exist_ok=True)
         write_files(written)
@@ -69,10 +64,10 @@ def drawn(
     arguments: argparse.Namespace,
 ) -> tuple[build.ReportFiles, build.Request, list[PlannerRuns], list[str]]:
     """Draw the page that is asked for; return lines on problems that only given data know, too."""
-    given = read_given(arguments.data) if arguments.data else None
-    known = shipped_best_known()
+    given = comparison_files.read_given(arguments.data) if arguments.data else None
+    known = comparison_files.shipped_best_known()
     if arguments.best_known:
-        known |= read_best_known(arguments.best_known)
+        known |= comparison_files.read_best_known(arguments.best_known)
     request = _asked(arguments)
     if given:  # a page of its own
         name = f"{request.report_name}+given_{given.sha256[:8]}"
@@ -82,8 +77,8 @@ def drawn(
     lengths = {key: each.length for key, each in known.items()}
     runs, strange = of_results(found.evolved, lengths), list[str]()
     if given:
-        strange = list(strange_problems(given, runs))
-        runs += of_given(given, runs)
+        strange = list(comparison_files.strange_problems(given, runs))
+        runs += comparison_files.of_given(given, runs)
     page = comparison.page(found, request.settings, runs, given)
     return build.page_files(request, page, found), request, runs, strange
 

@@ -120,7 +120,6 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
 
 
 def _curves(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw medians as lines (the average dashed) and quartiles as bands."""
     across = _across(table)
     for (position, condition), rows in groups(table, ["position", "condition"]):
         colour = style.condition_colour(position)

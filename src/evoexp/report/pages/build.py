@@ -11,9 +11,9 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.html_page import HTML, html_page
 from evoexp.report.pages.index import document
 from evoexp.report.pages.latex_tables import latex_tables
-from evoexp.report.pages.motion_pictures import players_of
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Drawing, Page
+from evoexp.report.pages.page_values import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.shipped import Option
@@ -132,18 +132,14 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
         "data": {
             "file": f"{drawing.stem}.csv",
             "rows": len(table),
-            "sha256": _sha256(rows),
+            "sha256": hashlib.sha256(rows).hexdigest(),
             # kinds of its columns, and what they hold
             "columns": {
                 str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
             },
             "description": drawing.columns,
         },
-        "files": {name: _sha256(content) for name, content in pictures.items()},
+        "files": {name: hashlib.sha256(image).hexdigest() for name, image in pictures.items()},
     }
     text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

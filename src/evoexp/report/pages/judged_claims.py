@@ -88,7 +88,6 @@ def _items(scope: Scope, entry: Mapping[str, Any]) -> Iterator[_Item]:
 
 
 def _claims(items: Sequence[_Item], entry: Mapping[str, Any]) -> Iterator[Claim]:
-    """Judge the items of a family."""
     kind = items[0].hearing.rule.kind if items else ""
     if "unjudged" in entry:
         verdict = f"{judging.NOT_JUDGED} ({entry['unjudged']})"
@@ -169,7 +168,6 @@ def _outcomes(label: str, rows: Sequence[Comparison], significance: float) -> st
 
 
 def _alone(item: _Item, entry: Mapping[str, Any]) -> Claim:
-    """Judge a claim that compares no conditions."""
     hearing, scope, own = item.hearing, item.scope, next(iter(item.conditions), None)
     value = item.values(own) if callable(item.values) else item.values
     if hearing.rule.kind == OWN:

@@ -270,7 +270,6 @@ def _check_keys(field: str, entry: Mapping[str, Any], kind: str) -> None:
 
 
 def _check(file: PageFile, field: str) -> None:
-    """Check all entries of a file: the names that they use, and the entries that pages name."""
     bound, uses = {*BOUND, *file.functions}, list[tuple[str, str, str]]()
     for section in sorted(KEYS.keys() & file.entries):
         for title, whole in file.entries[section].items():

@@ -1,27 +1,19 @@
-"""Values that every page may name: parts of results and settings, comparisons of conditions."""
+"""Values that every page may name: of results and settings, comparisons, and motions."""
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.playback import player_page
+from evoexp.playback.recording import Heading, NoMotion, Recording, record
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import PlayedRun, Quantity, quantity
+from evoexp.report.pages.page_parts import Drawing, PlayedRun, Player, Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import (
-    Comparison,
-    Family,
-    FamilyComparison,
-    Pair,
-    Values,
-    by_column,
-    compared,
-    rows_by_name,
-)
+from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 from evoexp.store.messages import TERM
 
@@ -57,7 +49,9 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "several": lambda results: len(results.with_data) > 1,  # there is something to compare
     "are_few": lambda results: len(results.evolved) <= FEW,
-    "whole": lambda conditions: (Family.of(conditions),),  # the first one against all others
+    "whole": lambda conditions: (
+        comparisons.Family.of(conditions),
+    ),  # the first one against all others
     "played": lambda condition: (PlayedRun(condition, condition.best_replicate),),
     "judge": lambda results, settings, rules: judging.judge(results, settings, rules),
     "confidence": lambda settings: settings.confidence,  # of every interval, in (0, 1)
@@ -77,24 +71,25 @@ def terms(results: Results) -> Iterator[Quantity]:
             name, _, unit = name.rpartition(" ")
         elif "distance" in term or "clearance" in term:
             unit = results.with_data[0].length_unit or "–"
-        yield quantity(results, name, unit, by_column(column))
+        yield quantity(results, name, unit, comparisons.by_column(column))
 
 
 def effect_rows(
-    compared: tuple[FamilyComparison, ...], names: Mapping[str, str]
-) -> dict[str, tuple[Comparison, ...]]:
+    compared: tuple[comparisons.FamilyComparison, ...], names: Mapping[str, str]
+) -> dict[str, tuple[comparisons.Comparison, ...]]:
     """Return the comparisons of families by quantity: of all, or of those that have a name."""
-    rows = rows_by_name(compared)
+    rows = comparisons.rows_by_name(compared)
     return {shown: rows[name] for name, shown in names.items() if name in rows} if names else rows
 
 
-MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
+# conditions of which every pair is tabled; of more, the first against each other one
+MOST_PAIRED = 6
 
 
-EFFORTS: dict[str, Values] = {  # quantities that every planner records; lower is better
-    "best cost": by_column("best_cost"),
-    "evaluations": by_column("evaluations"),
-    "collision queries": by_column("collision_queries"),
+EFFORTS: dict[str, comparisons.Values] = {  # quantities that every planner records; lower is better
+    "best cost": comparisons.by_column("best_cost"),
+    "evaluations": comparisons.by_column("evaluations"),
+    "collision queries": comparisons.by_column("collision_queries"),
     "CPU time, search [s]": search_seconds,
 }
 SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
@@ -105,7 +100,7 @@ SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
 }
 
 
-def differing(results: Results) -> dict[str, Values]:
+def differing(results: Results) -> dict[str, comparisons.Values]:
     """Return the quantities that are not the same in every run, by name."""
     return {
         name: values
@@ -114,23 +109,23 @@ def differing(results: Results) -> dict[str, Values]:
     }
 
 
-def _pairs(results: Results) -> list[Pair]:
+def _pairs(results: Results) -> list[comparisons.Pair]:
     """Return the pairs that tables hold; references have no seeds and stand aside."""
     first, *others = results.evolved
-    if len(others) < MOST:
+    if len(others) < MOST_PAIRED:
         return list(itertools.combinations(results.evolved, 2))
     return [(first, other) for other in others]
 
 
 def pairs_of_conditions(
-    results: Results, settings: ReportSettings, differing: dict[str, Values]
-) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    results: Results, settings: ReportSettings, differing: dict[str, comparisons.Values]
+) -> tuple[tuple[str, tuple[comparisons.Comparison, ...]], ...]:
     """Compare pairs in every quantity in which they differ; p-values are adjusted within each."""
     of = "pairs of conditions"
-    if len(results.evolved) > MOST:
+    if len(results.evolved) > MOST_PAIRED:
         of = f"{results.evolved[0].label} against each other condition"
     found = (
-        (f"{name}: {of}", compared(_pairs(results), values, settings, named=_named))
+        (f"{name}: {of}", comparisons.compared(_pairs(results), values, settings, named=_named))
         for name, values in differing.items()
     )
     return tuple((heading, rows) for heading, rows in found if rows)
@@ -163,3 +158,87 @@ def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]
 
 def _named(first: ConditionResults, second: ConditionResults) -> str:
     return f"{first.label} against {second.label}"
+
+
+JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`
+VERDICTS = {True: "certified", False: "refuted", None: "undecided"}
+MOST_SHOWN = 4  # conditions whose motions are shown, those with the least best cost
+
+
+class ShownMotion(NamedTuple):
+    """The best motion of a condition."""
+
+    condition: ConditionResults  # the condition
+    recording: Recording  # the motion of its best replicate
+
+
+def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, int], Player]:
+    """Return the players of all motions that figures show, each once, by the keys of the runs."""
+    players = dict[tuple[str, int], Player]()
+    for c, k in {run.key: run for drawing in drawings for run in drawing.plays}.values():
+        title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
+        if motion := _recorded(c, k, title):
+            words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
+            file = f"motion_{c.hash12}_{k:04d}.html"
+            players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
+    return players
+
+
+def _recorded(c: ConditionResults, replicate: int, title: str) -> Recording | None:
+    try:
+        return record(c.condition, c.solutions[replicate], Heading(title, replicate))
+    except NoMotion:
+        return None
+
+
+def best_motions(results: Results) -> list[ShownMotion]:
+    """Return the motions of the conditions with the least costs, at most `MOST_SHOWN`."""
+    motions = (
+        (c, _recorded(c, c.best_replicate, c.label))
+        for c in sorted(results.with_data, key=_best_cost)
+    )
+    shown = itertools.islice((ShownMotion(c, own) for c, own in motions if own), MOST_SHOWN)
+    return sorted(shown, key=lambda each: results.with_data.index(each.condition))
+
+
+def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
+    """Return the values that figures of motions show, by name.
+
+    `best` is the motion of the least cost alone, `covered` are those with the covers of their
+    bodies, one per robot that has any.
+    """
+    covered: dict[object, tuple[ShownMotion, Sequence[Any]]] = {}
+    for each in best_motions:
+        planner, problem = each.condition.prepared
+        if covers := tuple(planner.covers(problem)):
+            key = each.condition.robot, len(covers)
+            covered.setdefault(key, (each, covers))
+    best = sorted(best_motions, key=lambda each: _best_cost(each.condition))[:1]
+    return {
+        "titled": [
+            (f"{c.label}: {VERDICTS[recording.verdict.certified]}", recording)
+            for c, recording in best_motions
+        ],
+        "conditions": [each.condition for each in best_motions],
+        "runs": [PlayedRun(c, own.heading.replicate) for c, own in best_motions],
+        "best": [each.recording for each in best],
+        "best_condition": [each.condition for each in best],
+        "covered": [(own.condition.label, own.recording, rows) for own, rows in covered.values()],
+        "covered_conditions": [own.condition for own, _ in covered.values()],
+    }
+
+
+def notes(best_motions: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
+    """Return (conditions, note): the notes on the conditions whose motions are shown."""
+    labels: dict[str, list[str]] = {}
+    for each in best_motions:
+        for note in each.condition.condition.notes():
+            own = labels.setdefault(note, [])
+            if each.condition.label not in own:
+                own.append(each.condition.label)
+    return tuple((", ".join(own), note) for note, own in labels.items())
+
+
+def _best_cost(condition: ConditionResults) -> float:
+    cost = float(condition.summaries["best_cost"].astype("float64").min())
+    return cost if np.isfinite(cost) else np.inf

@@ -17,14 +17,8 @@ from evoexp.report.figures import records
 from evoexp.report.pages import markdown
 from evoexp.report.results.run_measures import certified, search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import inference
 from evoexp.report.statistics.comparisons import Values, by_column
-from evoexp.report.statistics.inference import (
-    BOOTSTRAP_SEED,
-    Proportion,
-    percentiles,
-    quantile,
-    spread,
-)
 
 JOIN = " · "  # between the parts of a label
 _SETTING = re.compile(r"([\w.@/-]+)=(.*)")
@@ -96,13 +90,13 @@ def main_effects(
             pairs = _pairs(sweep, base, k, (first, other), values)
             if not pairs.size:
                 continue
-            rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+            rng = np.random.Generator(np.random.PCG64(inference.BOOTSTRAP_SEED))
             drawn = rng.integers(0, len(pairs), (num_resamples, len(pairs)))
-            medians = np.array([quantile(pairs[seeds].ravel(), 0.5) for seeds in drawn])
+            medians = np.array([inference.quantile(pairs[seeds].ravel(), 0.5) for seeds in drawn])
             known = pairs[~np.isnan(pairs)]
             better = float((known < 0.0).mean() + 0.5 * (known == 0.0).mean())
-            ends = percentiles(medians, confidence)
-            numbers = len(known), quantile(known, 0.5), *ends, better
+            ends = inference.percentiles(medians, confidence)
+            numbers = len(known), inference.quantile(known, 0.5), *ends, better
             rows.append((base, setting, first, other, *numbers))
     names = ["base", "setting", "first", "other", "pairs", "difference", "low", "high", "better"]
     return pd.DataFrame(rows, columns=names)
@@ -174,7 +168,7 @@ def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]
     """Yield a row per combination: shares of runs, and the spreads of what they took."""
     for each in sweep.conditions:
         c = each.results
-        proven = Proportion(certified(c).having, c.done)
+        proven = inference.Proportion(certified(c).having, c.done)
         shares = (runs.with_interval(confidence) for runs in (success(c), proven))
         yield (
             *((each.base,) if any(sweep.bases) else ()),
@@ -182,7 +176,7 @@ def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]
             f"`{c.hash12}`",
             c.done,
             *(shares if c.done else ("–", "–")),
-            *(markdown.spread(spread(of(c))) for of in MEASURES.values()),
+            *(markdown.spread(inference.spread(of(c))) for of in MEASURES.values()),
         )
 
 
@@ -201,7 +195,6 @@ def effect_rows_by_value(effects: pd.DataFrame) -> Iterator[tuple[object, ...]]:
 
 
 def _more(count: int) -> str:
-    """Tell how many panels are left out; empty if none is."""
     most = MOST_PANELS
     return f" The first {most} of {count} panels; the data have all." if count > most else ""
 

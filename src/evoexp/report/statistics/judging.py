@@ -249,7 +249,6 @@ class Hearing(NamedTuple):
 
 
 def _least_effect(rows: Sequence[Comparison]) -> EffectSize | None:
-    """Return the least A12 of some comparisons."""
     effects = sorted((row.better for row in rows), key=lambda each: each.a12)
     return next((EffectSize("A12", each.a12, *each.interval, 0.5) for each in effects), None)
 

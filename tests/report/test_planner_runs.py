@@ -1,7 +1,4 @@
-"""Planners by their proven answers: names, lengths, efforts, shares, files, ranks over problems.
-
-Ranks are compared with the printed numbers of Demšar (2006), and with plain counts.
-"""
+"""Planners by their proven answers, and ranks over problems, against printed and plain numbers."""
 
 import csv
 import io
@@ -83,9 +80,11 @@ def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Res
         ("random_search", "rana_planar"),
         ("via_point_ga", "three arms"),
     ]
-    alike = [replace(c, label=label, options=()) for c, label in zip(other, "aba", strict=True)]
+    unlabelled = [
+        replace(c, label=label, options=()) for c, label in zip(other, "aba", strict=True)
+    ]
     scenario = both.evolved[0].condition.scenario.component
-    assert {n for _, n in names(of_results(alike))} == {f"{scenario} 1", f"{scenario} 2"}
+    assert {n for _, n in names(of_results(unlabelled))} == {f"{scenario} 1", f"{scenario} 2"}
 
 
 def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -> None:

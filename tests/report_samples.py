@@ -17,14 +17,12 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.report.figures import style
 from evoexp.report.pages import build, page_registration
 from evoexp.report.pages.page_builder import PageBuilder, family_comparisons
-from evoexp.report.pages.page_file import read_page_file
+from evoexp.report.pages.page_file import Functions, Scope, read_page_file
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.pages.page_scope import Functions, Scope
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
-from evoexp.report.statistics.claim_rules import Rule
-from evoexp.report.statistics.judging import Hearing, Judge
+from evoexp.report.statistics.judging import Hearing, Judge, Rule
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory
 
@@ -139,10 +137,10 @@ def smoke_report(outputs: Path, name: str, **changed: Any) -> Path:
     """Return the directory of a whole report; some settings of it may be changed."""
     smoke_results(outputs, name)
     experiment = smoke_experiment(name)
-    request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
     settings = page_settings(name).model_copy(update=changed)
-    derived = build.derived(request, settings, outputs, experiment.num_replicates)
-    return build.write_report(derived).parent
+    planned = experiment.conditions, settings, experiment.num_replicates
+    request = build.Request(experiment.report_name, name, experiment.budget, *planned, name)
+    return request.write(outputs).parent
 
 
 def figure_stems(directory: Path) -> set[str]:

@@ -22,7 +22,7 @@ from evoexp.commands.command_parser import COMMANDS, command_parser
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report.statistics.claim_rules import registered_rules
+from evoexp.report.statistics.judging import registered_rules
 from evoexp.version import __version__
 
 ROOT = Path(__file__).parents[1]

@@ -9,7 +9,7 @@ from command_samples import Evoexp
 from evoexp.commands.claim_list import KEYS
 from evoexp.configuration.search_path import options
 from evoexp.registry import CLAIMS, Registration, registrations
-from evoexp.report.statistics.claim_rules import registered_rules
+from evoexp.report.statistics.judging import registered_rules
 
 
 def test_a_claim_that_nothing_was_run_for_names_the_command(evoexp: Evoexp) -> None:

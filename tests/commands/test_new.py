@@ -72,11 +72,11 @@ def test_it_keeps_a_planners_obligations(check: Check, label: str) -> None:
 
 
 PAGE = """
-from evoexp.report.pages.generic import page as generic
+from evoexp.report.pages.page_builder import own_page
 
 def page(results, settings):
     print("the guest's page")
-    return generic(results, settings)
+    return own_page("generic", results, settings)
 """
 
 

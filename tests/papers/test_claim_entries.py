@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report.pages.judged_entries import judged_as_written
-from evoexp.report.pages.page_file import read_page_file
+from evoexp.report.pages.judged_claims import judged_as_written
+from evoexp.report.pages.page_file import Functions, Scope, read_page_file
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.pages.page_scope import Functions, Scope
-from evoexp.report.statistics.claim_rules import Rule, registered_rules
-from evoexp.report.statistics.judging import Judge
+from evoexp.report.statistics.judging import Judge, Rule, registered_rules
 from evoexp.shipped import shipped
 from report_samples import made_up, page_settings, smoke_experiment
 

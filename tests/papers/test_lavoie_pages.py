@@ -10,7 +10,7 @@ from evoexp.papers.lavoie import figures, measures
 from evoexp.papers.lavoie.figures import ShownMotion
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report.figures import shares
+from evoexp.report.figures import side_by_side
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.stored_results import ConditionResults
@@ -129,10 +129,12 @@ def test_attempts_add_up_to_all_runs() -> None:
 def test_shares_mark_what_is_printed_and_survive_nothing() -> None:
     three, none = Proportion(3, 4), Proportion(0, 0)
     rows = [("error below 1", 0, "a", three), ("error below 1", 1, "b", none)]
-    table = shares.shares_table(rows, {"error below 1": 0.935}, 0.95)
+    table = side_by_side.shares_table(rows, {"error below 1": 0.935}, 0.95)
     assert list(table["printed"]) == [0.935, 0.935]
-    (axes,) = shares.draw_shares(table).axes
+    (axes,) = side_by_side.draw_shares(table).axes
     assert [text.get_text().strip() for text in axes.texts] == ["3/4", "0/0"]
     low, high = axes.get_xlim()
     assert low < 100 * table["lower"].iloc[0] < 93.5 < high
-    assert can_be_drawn(shares.shares_table([("x", 0, "a", none)], {}, 0.95), shares.draw_shares)
+    assert can_be_drawn(
+        side_by_side.shares_table([("x", 0, "a", none)], {}, 0.95), side_by_side.draw_shares
+    )

@@ -7,12 +7,14 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib as mpl
 import pandas as pd
 import pytest
 
+from evoexp import cli
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.rana import claims as rana_claims
@@ -21,7 +23,7 @@ from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
 from evoexp.store.run_directory import RunDirectory
-from report_samples import REPORT, expand, store
+from report_samples import REPORT, SMALL, expand, store
 
 SCRIPT = """
 import sys
@@ -39,10 +41,11 @@ SPATIAL += ["fig_12b_configuration_space", "fig_12b_operational_space", "fig_13_
 def draw(outputs: Path, experiment: Experiment, page: str | None = "rana", *formats: str) -> Path:
     """Write a report; return its page in Markdown."""
     name, budget = experiment.report_name, experiment.budget
-    request = build.Request(name, experiment.name, budget, experiment.conditions)
     settings = ReportSettings(**REPORT | {"figures": page, "formats": formats or ("svg", "png")})
-    report = build.derived(request, settings, outputs, experiment.num_replicates)
-    return build.write_report(report).with_suffix(".md")
+    planned = experiment.conditions, settings, experiment.num_replicates
+    words = f"{experiment.name} budget={budget}"
+    request = build.Request(name, experiment.name, budget, *planned, words)
+    return request.write(outputs).with_suffix(".md")
 
 
 def contents(page: Path) -> dict[str, bytes]:
@@ -193,3 +196,48 @@ def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
     assert mpl.rcParams["svg.hashsalt"] == mpl.rcParamsDefault["svg.hashsalt"]
     pyplot = sys.modules.get("matplotlib.pyplot")  # axes in space import it
     assert pyplot is None or pyplot.get_fignums() == []
+
+
+Report = Callable[..., Path]
+
+
+@pytest.fixture
+def report(
+    stored: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    blank_figures: None,
+    capsys: pytest.CaptureFixture[str],
+) -> Report:
+    """Return the function that runs `evoexp report`; it gives the page in Markdown."""
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(stored))
+
+    def report(*words: str) -> Path:
+        assert cli.main(["report", *words]) == 0
+        named = Path(capsys.readouterr().out.removeprefix("report: ").strip())
+        assert named.name == "index.html"
+        return named.with_suffix(".md")
+
+    return report
+
+
+def test_a_report_names_the_command_that_draws_it(report: Report, stored: Path) -> None:
+    index = report("rana_planar", *SMALL)
+    assert index == stored / "reports" / expand("rana_planar").report_name / "index.md"
+    others = " ".join(word for word in SMALL if not word.startswith("budget"))
+    made_by = f"Made by `evoexp report rana_planar budget=smoke {others}`"
+    assert made_by in index.read_text()
+
+
+def test_the_experiment_may_be_an_override_as_for_run(report: Report) -> None:
+    words = "experiment=rana_planar", *SMALL, "report.dpi=40", "--only", "random search"
+    text = report(*words).read_text()
+    assert "--only 'random search'`" in text and "| via-point GA |" not in text
+
+
+def test_runs_by_prefixes_of_their_hashes(report: Report) -> None:
+    one, two, *_ = (c.condition.id for c in expand("rana_planar").conditions)
+    index = report(one[:6], two[:8].upper())
+    assert index.parent.name == f"{one[:12]}+{two[:12]}"
+    text = index.read_text()
+    assert f"`evoexp report {one[:12]} {two[:12]}`" in text
+    assert f"{one[:12]} against {two[:12]}" in text

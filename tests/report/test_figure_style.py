@@ -19,8 +19,8 @@ from PIL import Image
 
 from evoexp.cli import main
 from evoexp.errors import SettingError
-from evoexp.report.figures import end_labels, style
-from evoexp.report.figures.end_labels import MANY, name_curves, name_ends
+from evoexp.report.figures import marks, style
+from evoexp.report.figures.marks import MANY, name_curves, name_ends
 from evoexp.report.figures.style import drawn
 from report_samples import SMALL
 
@@ -272,14 +272,14 @@ def test_names_at_the_ends_of_curves_keep_apart() -> None:
     heights = [0.5] * 5 + [0.99, np.nan]
     name_ends(axes, [(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
     places = sorted(text.xyann[1] for text in axes.texts)
-    assert len(places) == 6 and np.diff(places).min() >= end_labels.APART - 1e-9
+    assert len(places) == 6 and np.diff(places).min() >= marks.APART - 1e-9
     assert np.mean(places[:5]) == pytest.approx(0.5)  # around their curves
     assert {text.xy for text in axes.texts} == {(0.5, 0.5), (0.5, 0.99)}
 
 
 @given(st.lists(st.floats(0.0, 1.0), max_size=40), st.floats(0.01, 0.2))
 def test_places_of_names_are_apart_in_order_and_inside(wanted: list[float], gap: float) -> None:
-    found = end_labels.apart(np.sort(np.array(wanted)), gap)
+    found = marks.apart(np.sort(np.array(wanted)), gap)
     least = min(gap, 1.0 / max(len(wanted) - 1, 1))
     assert len(found) == len(wanted)
     assert (np.diff(found) >= least - 1e-9).all()

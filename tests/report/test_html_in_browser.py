@@ -7,8 +7,7 @@ from test_html_page import PLAIN, RANA, RUN, summary
 
 from chromium import NEEDS_BROWSER, Browser
 from chromium import browser as browser
-from evoexp.report.pages.home_page import home_page
-from evoexp.report.pages.html_page import html_page
+from evoexp.report.pages.html_page import home_page, html_page
 from evoexp.report.pages.page_parts import Table
 from report_samples import smoke_report
 

@@ -8,15 +8,18 @@ import pytest
 from matplotlib.figure import Figure
 
 from evoexp.report.pages import markdown
-from evoexp.report.pages.home_page import (
+from evoexp.report.pages.html_page import (
     Paper,
     ReportSummary,
     StoredRun,
     home_page,
+    html_page,
+    inline,
+    number_columns,
     read_summary,
     site,
+    verdict_counts,
 )
-from evoexp.report.pages.html_page import html_page, inline, number_columns, verdict_counts
 from evoexp.report.pages.page_parts import Document, Drawing, PlayedRun, Player, Table, Verdict
 from html_reader import Page, markdown_tables
 from report_samples import shown_run, smoke_report

@@ -54,16 +54,6 @@ def test_quantiles_of_infinite_and_missing_values() -> None:
 
 
 @pytest.mark.parametrize(
-    ("successes", "trials"), [(0, 20), (1, 7), (13, 20), (20, 20), (998, 1000)]
-)
-@pytest.mark.parametrize("confidence", [0.9, 0.99])
-def test_wilson_is_that_of_scipy(successes: int, trials: int, confidence: float) -> None:
-    expected = scipy.stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    found = Proportion(successes, trials).interval(confidence)
-    assert found == pytest.approx((expected.low, expected.high), abs=1e-9)
-
-
-@pytest.mark.parametrize(
     ("one", "two", "low", "high"),
     [  # Newcombe 1998, Table II, method 10
         (Proportion(56, 70), Proportion(48, 80), 0.0524, 0.3339),

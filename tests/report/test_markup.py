@@ -2,7 +2,10 @@
 
 import itertools
 import re
+import shutil
+import subprocess
 from math import inf, nan
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,11 +16,11 @@ from hypothesis import strategies as st
 from evoexp.commands.console import coloured, new_table, plain_console
 from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
-from evoexp.report.pages import markdown, motion_pictures
+from evoexp.report.pages import markdown, page_values
 from evoexp.report.pages.index import in_few_words, provenance
 from evoexp.report.pages.latex_tables import PACKAGES, escaped, latex_tables
 from evoexp.report.pages.page_parts import Document, Table, Verdict
-from report_samples import shown_run
+from report_samples import shown_run, smoke_report
 
 
 @pytest.mark.parametrize(
@@ -89,7 +92,7 @@ def shown(label: str, *notes: str) -> Any:
 
 def test_equal_notes_on_conditions_stand_in_one_row() -> None:
     first = shown("I", "covers", "pairs"), shown("I", "covers")
-    found = motion_pictures.notes([*first, shown("II", "covers"), shown("III")])
+    found = page_values.notes([*first, shown("II", "covers"), shown("III")])
     assert found == (("I, II", "robot: covers"), ("I", "robot: pairs"))
 
 
@@ -238,3 +241,53 @@ def test_escaped_names_hold_no_commands_but_ours(text: str) -> None:
     long_word = "scenario.obstacles.0.radius"
     assert escaped(long_word) == r"scenario.\allowbreak{}obstacles.0.\allowbreak{}radius"
     assert escaped("via-point GA, x = 10 (given)") == "via-point GA, x = 10 (given)"
+
+
+NEEDS_LATEX = pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")
+WIDEST = 1.0  # [pt] that a line may be too wide
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Return the lines that show every table and every figure of two reports."""
+    outputs = tmp_path_factory.mktemp("outputs")
+    lines = []
+    for name in ("curkovic_methods", "corsepius"):
+        report = smoke_report(outputs, name, formats=("pdf",), width="column")
+        tables, figures = sorted(report.glob("table_*.tex")), sorted(report.glob("*.pdf"))
+        assert len(tables) > 6 and len(figures) > 1
+        # LaTeX keeps a limited number of floats for later pages
+        lines += [rf"\input{{{path}}}\clearpage" for path in tables]
+        for path in figures:
+            picture = rf"\includegraphics[width=\linewidth]{{{path}}}"
+            lines += [r"\begin{figure}", picture, r"\end{figure}", r"\clearpage"]
+    return lines
+
+
+def log_of(paper: str, parts: list[str], folder: Path) -> str:
+    """Return the log of an article of two columns; it has a page for each of its parts."""
+    head = [rf"\documentclass[twocolumn,{paper}]{{article}}", r"\usepackage{graphicx}", PACKAGES]
+    text = [*head, r"\begin{document}", *parts, r"\end{document}", ""]
+    (folder / "article.tex").write_text("\n".join(text))
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "article.tex"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, timeout=200)
+    log = (folder / "article.log").read_text(errors="replace")
+    assert done.returncode == 0, log[-2000:]
+    return log
+
+
+@NEEDS_LATEX
+@pytest.mark.matrix
+@pytest.mark.parametrize("paper", ["letterpaper", "a4paper"])
+def test_every_table_and_figure_fits(paper: str, parts: list[str], tmp_path: Path) -> None:
+    log = log_of(paper, parts, tmp_path)
+    wide = re.findall(r"Overfull \\hbox \(([\d.]+)pt too wide\)", log)
+    assert all(float(width) <= WIDEST for width in wide), wide
+    assert "Float too large" not in log and r"Overfull \vbox" not in log
+
+
+@NEEDS_LATEX
+@pytest.mark.matrix
+def test_a_line_that_is_too_wide_is_noticed(tmp_path: Path) -> None:
+    log = log_of("a4paper", [r"\noindent\rule{300pt}{1pt}"], tmp_path)
+    assert r"Overfull \hbox" in log

@@ -1,40 +1,49 @@
-"""Planners by their proven answers: names out of labels, lengths, efforts, shares and files."""
+"""Planners by their proven answers, and ranks over problems, against printed and plain numbers."""
 
 import csv
 import io
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from scipy.interpolate import CubicSpline
 
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report.figures.effort_curves import (
-    draw_shares,
-    draw_shares_by_problem,
-    length_table,
-    problem_share_table,
-    share_table,
-)
+from evoexp.report.figures import effort_curves
 from evoexp.report.pages import comparison
 from evoexp.report.pages.comparison import Rated, as_csv
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import proven_answers
-from evoexp.report.results.planner_runs import MULTIPLES, PlannerRuns, Problem, of_results
-from evoexp.report.results.proven_answers import (
+from evoexp.report.results import planner_runs
+from evoexp.report.results.planner_runs import (
+    MULTIPLES,
     Answer,
+    PlannerRuns,
+    Problem,
     answer_table,
     answers_of,
     motion_length,
+    of_results,
     straight_line,
 )
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.report.statistics.inference import Interval, Spread
+from evoexp.report.statistics.problem_ranks import (
+    Standing,
+    alike,
+    critical_difference,
+    effort_ratios,
+    friedman,
+    standing,
+)
 from evoexp.store.log_reader import read_log
-from report_samples import expand, store
+from report_samples import expand, made_up_runs, store
 
 SOME = [
     Answer(0, 0, 50, 1000, 9.0, 4.0, True, False),
@@ -71,9 +80,11 @@ def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Res
         ("random_search", "rana_planar"),
         ("via_point_ga", "three arms"),
     ]
-    alike = [replace(c, label=label, options=()) for c, label in zip(other, "aba", strict=True)]
+    unlabelled = [
+        replace(c, label=label, options=()) for c, label in zip(other, "aba", strict=True)
+    ]
     scenario = both.evolved[0].condition.scenario.component
-    assert {n for _, n in names(of_results(alike))} == {f"{scenario} 1", f"{scenario} 2"}
+    assert {n for _, n in names(of_results(unlabelled))} == {f"{scenario} 1", f"{scenario} 2"}
 
 
 def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -> None:
@@ -110,8 +121,8 @@ def test_lengths_are_those_of_many_short_steps(seed: int) -> None:
 def test_answers_are_the_logged_improvements_judged(
     results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(proven_answers, "cache_root", lambda: tmp_path)  # judged anew
-    monkeypatch.setattr(proven_answers, "WORTH_WORKERS", 1)
+    monkeypatch.setattr(planner_runs, "cache_root", lambda: tmp_path)  # judged anew
+    monkeypatch.setattr(planner_runs, "WORTH_WORKERS", 1)
     together = answers_of(results.evolved)
     assert list(together) == [c.label for c in results.evolved]
     assert len([*(tmp_path / "answers").iterdir()]) == sum(c.done for c in results.evolved)
@@ -131,7 +142,10 @@ def test_answers_are_the_logged_improvements_judged(
 
 def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results: Results) -> None:
     runs = of_results(results.evolved)
-    table, lengths = share_table(runs), length_table(runs).groupby("planner")["median"].last()
+    table, lengths = (
+        effort_curves.share_table(runs),
+        effort_curves.length_table(runs).groupby("planner")["median"].last(),
+    )
     for own, condition in zip(runs, results.evolved, strict=True):
         assert lengths[own.label] == pytest.approx(np.median(own.best_lengths))
         answers = own.table[own.table["certified"]]
@@ -142,20 +156,24 @@ def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results
             good = answers[answers["collision_queries"] <= x].groupby("replicate")["length"].min()
             count = (good.to_numpy()[:, None] <= targets).sum()
             assert share == pytest.approx(count / curve["targets"].iloc[0])
-    labels = [str(line.get_label()) for line in draw_shares(table).axes[0].get_lines()]
+    labels = [
+        str(line.get_label()) for line in effort_curves.draw_shares(table).axes[0].get_lines()
+    ]
     assert [label.partition(" (")[0] for label in labels] == [own.label for own in runs]
 
 
 def test_shares_of_all_problems_are_the_mean_of_those_of_each(both: Results) -> None:
     runs = of_results(both.evolved)
-    table = problem_share_table(runs).astype({"collision_queries": float, "share": float})
-    pooled = share_table(runs, table["collision_queries"].unique()).groupby("planner")
+    table = effort_curves.problem_share_table(runs).astype(
+        {"collision_queries": float, "share": float}
+    )
+    pooled = effort_curves.share_table(runs, table["collision_queries"].unique()).groupby("planner")
     for planner, own in table.groupby("planner"):
         weighted = (own["share"] * own["targets"]).groupby(own["collision_queries"]).sum()
         total = own.groupby("problem")["targets"].first().sum()
         shown = pooled.get_group(planner)["share"].astype(float)
         assert np.allclose(weighted.to_numpy() / total, shown)
-    axes = draw_shares_by_problem(table).axes
+    axes = effort_curves.draw_shares_by_problem(table).axes
     titles = [each.get_title(loc="left") or each.get_title() for each in axes]
     assert titles == list(table["problem"].unique())
     assert len({each.get_xlim() for each in axes}) == 1
@@ -229,3 +247,139 @@ def test_csv_has_all_digits() -> None:
     assert [float(cell) for cell in first[4:]] == numbers
     unknown = ["", "", ""]  # of runs that were given
     assert second == ["C (given)", "q, {a}", "2", "0", "inf", "1000000.0", *["inf"] * 4, *unknown]
+
+
+AREAS = np.loadtxt(Path(__file__).with_name("demsar_areas.csv"), delimiter=",", encoding="utf-8")
+COSTS = st.sampled_from([1.0, 2.0, 3.0, 4.0, np.inf])
+TABLES = arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS)
+
+
+def stands(lengths: np.ndarray, efforts: np.ndarray | None = None) -> Standing:
+    problems = tuple(f"problem {k}" for k in range(len(lengths)))
+    planners = tuple(f"planner {k}" for k in range(lengths.shape[1]))
+    return Standing(planners, problems, (), (), lengths if efforts is None else efforts, lengths)
+
+
+def test_mean_ranks_and_critical_differences_are_demsars() -> None:
+    found = stands(1.0 - AREAS)
+    assert found.mean_ranks.round(3).tolist() == [3.143, 2.0, 2.893, 1.964]
+    assert critical_difference(4, 14, 0.05) == pytest.approx(1.25, abs=0.005)
+    assert critical_difference(4, 14, 0.10) == pytest.approx(1.12, abs=0.005)
+    # Tab. 5 (a): critical values of the two-tailed Nemenyi test at 0.05
+    printed = (1.960, 2.343, 2.569, 2.728, 2.850, 2.949, 3.031, 3.102, 3.164)
+    for planners, value in enumerate(printed, 2):
+        scale = np.sqrt(planners * (planners + 1) / (6.0 * 14))
+        assert critical_difference(planners, 14, 0.05) / scale == pytest.approx(value, abs=1.5e-3)
+
+
+def test_friedmans_statistic_is_that_of_the_formula() -> None:
+    found = stands(1.0 - AREAS)
+    plain = 12 * 14 / (4 * 5) * ((found.mean_ranks**2).sum() - 4 * 5**2 / 4)
+    assert plain == pytest.approx(9.28, abs=0.01)  # as printed, without correction for ties
+    ties = sum(n**3 - n for row in AREAS for n in np.unique(row, return_counts=True)[1])
+    corrected = plain / (1.0 - ties / (14 * 4 * (4**2 - 1)))
+    assert friedman(1.0 - AREAS).statistic == pytest.approx(corrected)
+    assert friedman(np.full((6, 3), np.inf)) == (0.0, 1.0)
+    assert friedman(np.tile([1.0, 2.0, np.inf], (6, 1))).p_value < 0.01
+
+
+@given(TABLES)
+def test_ranks_count_who_is_better(lengths: np.ndarray) -> None:
+    ranks = stands(lengths).ranks
+    better = (lengths[:, None, :] < lengths[:, :, None]).sum(axis=2)
+    equal = (lengths[:, None, :] == lengths[:, :, None]).sum(axis=2)
+    assert np.array_equal(ranks, better + (equal + 1) / 2)
+
+
+@given(TABLES)
+def test_profiles_count_problems(efforts: np.ndarray) -> None:
+    ratios = effort_ratios(efforts)
+    for (i, j), effort in np.ndenumerate(efforts):
+        assert ratios[i, j] == (np.inf if np.isinf(effort) else effort / efforts[i].min())
+    table = effort_curves.profiles_table(stands(efforts))
+    for row in table.itertuples():
+        own = ratios[:, int(str(row.planner).removeprefix("planner "))]
+        assert row.share == sum(ratio <= row.ratio for ratio in own) / len(own)
+    last = table.groupby("planner")["share"].last()
+    assert last.tolist() == [np.isfinite(own).mean() for own in efforts.T]
+
+
+@given(st.lists(st.floats(1.0, 6.0), min_size=2, max_size=7), st.floats(0.1, 3.0))
+def test_groups_join_all_pairs_that_do_not_differ(ranks: list[float], difference: float) -> None:
+    ranks = sorted(ranks)
+    groups = alike(ranks, difference)
+    for i, j in itertools.combinations(range(len(ranks)), 2):
+        joined = any(first <= i and j <= last for first, last in groups)
+        assert joined == (ranks[j] - ranks[i] < difference)
+    for one, two in itertools.permutations(groups, 2):
+        assert not (one[0] >= two[0] and one[1] <= two[1])  # none inside of another
+
+
+def runs_of(planner: str, problem: str, *lengths: float) -> PlannerRuns:
+    """Return runs whose one answer, where there is one, comes at a tenth of the effort."""
+    rows = [(k, 10.0, length) for k, length in enumerate(lengths) if np.isfinite(length)]
+    return made_up_runs(planner, problem, rows, [100.0] * len(lengths))
+
+
+def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
+    found = standing(
+        [
+            runs_of("A", "p", 1.0, 2.0, 9.0),
+            runs_of("B", "p", *[3.0] * 50),
+            runs_of("A", "q", np.inf, np.inf, 1.0),
+            runs_of("B", "q", 4.0, 4.0),
+            runs_of("A", "only A", 1.0),
+        ]
+    )
+    assert (found.planners, found.problems) == (("A", "B"), ("p", "q"))
+    assert found.left_out == ("only A",)
+    assert found.lengths.tolist() == [[2.0, 3.0], [np.inf, 4.0]]
+    assert found.efforts.tolist() == [[10.0, 10.0], [210.0, 10.0]]
+    assert found.mean_ranks.tolist() == [1.5, 1.5]
+    assert found.can_be_profiled and not found.can_be_tested
+
+
+def test_a_planner_of_few_problems_is_not_ranked_and_costs_no_problem() -> None:
+    runs = [runs_of(name, problem, 1.0) for problem in "pqrs" for name in "AB"]
+    few = [runs_of("few", "p", 1.0), *(runs_of("few", f"own {k}", 1.0) for k in range(9))]
+    found = standing([*runs, *few])
+    assert (found.planners, found.outsiders) == (("A", "B"), ("few",))
+    assert (found.problems, len(found.left_out)) == (tuple("pqrs"), 9)
+    half = standing([*runs, runs_of("half", "p", 1.0), runs_of("half", "q", 1.0)])
+    assert (half.planners, half.problems) == (("A", "B", "half"), ("p", "q"))
+    assert half.left_out == ("r", "s") and not half.outsiders
+
+
+RANKED = ("performance_profiles", "critical_difference")
+
+
+def test_the_page_says_why_there_is_no_test_or_no_ranking(settings: ReportSettings) -> None:
+    def page_parts(problems: str, planners: str) -> tuple[str, str, list[str]]:
+        runs = [runs_of(a, p, float(k + 1)) for p in problems for k, a in enumerate(planners)]
+        page = comparison.page(Results("", "", ()), settings, runs)
+        notes = {table.heading: table.note for table in page.tables}
+        stems = [drawing.stem for drawing in page.drawings if drawing.stem in RANKED]
+        return notes["Problems"], notes.get("Ranks over problems", ""), stems
+
+    remark, notes, stems = page_parts("p", "ABC")
+    assert "not ranked" in remark and (notes, stems) == ("", [])
+    remark, notes, stems = page_parts("pqrs", "ABC")
+    assert "not ranked" not in remark and stems == ["performance_profiles"]
+    assert "5 problems that all of them were run on; here are 3 planners and 4" in notes
+    remark, notes, stems = page_parts("pqrst", "ABC")
+    assert "not ranked" not in remark and stems == ["performance_profiles", "critical_difference"]
+    assert "the planners rank differently" in notes and "unit of a ranking" in notes
+
+
+def test_figures_name_every_planner() -> None:
+    rng = np.random.default_rng(3)
+    found = stands(rng.random((8, 7)), rng.random((8, 7)))
+    assert found.can_be_tested
+    table = effort_curves.critical_difference_table(found, 0.05)
+    assert table["mean_rank"].is_monotonic_increasing
+    (axes,) = effort_curves.draw_critical_difference(table).axes
+    texts = " ".join(text.get_text() for text in axes.texts)
+    assert all(name in texts for name in found.planners)
+    (axes,) = effort_curves.draw_profiles(effort_curves.profiles_table(found)).axes
+    labels = [str(line.get_label()) for line in axes.get_lines()]  # of the ways to names: "_…"
+    assert [label for label in labels if not label.startswith("_")] == list(found.planners)

@@ -3,14 +3,13 @@
 import pandas as pd
 import pytest
 
-from evoexp.report.figures.specification import draw_specification
+from evoexp.report.figures.side_by_side import draw_specification
+from evoexp.report.pages.judged_claims import Headline, over_readings
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Claim, Page
-from evoexp.report.pages.readings import Headline, over_readings
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
-from evoexp.report.statistics.claim_rules import Rule
 from evoexp.report.statistics.comparisons import by_column
-from evoexp.report.statistics.judging import Judge
+from evoexp.report.statistics.judging import Judge, Rule
 from report_samples import page_settings, smoke_experiment, store
 
 EXPERIMENT = """

@@ -15,10 +15,9 @@ from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.claim_rules import KINDS, Rules, read_rules
-from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
+from evoexp.report.statistics.comparisons import Comparison, compare
 from evoexp.report.statistics.inference import Proportion, fisher_exact, runs_for_effect
-from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED, UNDECIDED, greater
+from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED, UNDECIDED
 from report_samples import hearing, page_settings
 
 LOW = np.arange(12.0)
@@ -98,11 +97,6 @@ def test_two_infinite_costs_do_not_differ() -> None:
     assert (found.median_difference, found.num_runs) == (0.0, "3 and 4")
 
 
-def test_p_values_are_adjusted_over_all_comparisons() -> None:
-    first, second = adjusted([BETTER, EQUAL])
-    assert (first.p_adjusted, second.p_adjusted) == (2.0 * BETTER.better.p_value, 1.0)
-
-
 def test_unsolved_runs_are_the_worst_class_whatever_the_rest_cost() -> None:
     """Of runs that never get there it counts how many there are, not by how much others differ."""
     order, never = np.arange(20.0) / 100.0, np.arange(20) >= 4
@@ -137,8 +131,8 @@ def test_no_verdict_goes_against_its_statistic(
 def test_shares_are_told_apart_in_their_own_direction(a: int, b: int, c: int, d: int) -> None:
     one, two = Proportion(min(a, b), b), Proportion(min(c, d), d)
     p_value = fisher_exact(one, two)
-    says = greater(one, two, p_value, 0.05)
-    assert says == -greater(two, one, p_value, 0.05)
+    says = judging.greater(one, two, p_value, 0.05)
+    assert says == -judging.greater(two, one, p_value, 0.05)
     if one.total and two.total:
         assert says in (0, int(np.sign(one.share - two.share)))
         assert (says != 0) == (p_value < 0.05)
@@ -169,10 +163,10 @@ ENTRY = 'told: {{claim: "{{who}}a claim of {{metric}}", source: "section 5", kin
 OWN = ', reproduced: "{metric} at most {most} times", limits: {most: 2.5}'
 
 
-def rules_of(tmp_path: Path, kind: str, more: str = "") -> Rules:
+def rules_of(tmp_path: Path, kind: str, more: str = "") -> judging.Rules:
     path = tmp_path / "rules.yaml"
     path.write_text(ENTRY.format(kind=kind) + "experiments: [e]" + more + "}", encoding="utf-8")
-    return read_rules(path)
+    return judging.read_rules(path)
 
 
 def test_a_rule_fills_in_its_words_and_limits(tmp_path: Path) -> None:
@@ -216,7 +210,7 @@ REPRODUCING = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", judging.KINDS)
 def test_a_claim_carries_its_rule_and_is_judged_by_its_kind_alone(
     tmp_path: Path, kind: str
 ) -> None:
@@ -229,7 +223,7 @@ def test_a_claim_carries_its_rule_and_is_judged_by_its_kind_alone(
     assert (claim.verdict, claim.name) == (verdict, "told")
     assert claim.rule.startswith(rule) and "{" not in claim.rule
     assert any(number in claim.n for number in ("20", "12", "–"))
-    for other in KINDS.keys() - {kind}:
+    for other in judging.KINDS.keys() - {kind}:
         with pytest.raises(ValueError, match=f"its rule is '{kind}'"):
             judge(on, other, REPRODUCING[other])
 

@@ -13,7 +13,7 @@ from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages.html_page import verdict_counts
 from evoexp.report.pages.page_builder import page_of
-from evoexp.report.statistics.claim_rules import Rules, registered_rules
+from evoexp.report.statistics.judging import Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 
 _OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "size", "n", "verdict")
@@ -72,11 +72,11 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
             if not ids <= judged.get(rule.name, set())
         ]
         try:
-            request, settings, num_replicates = request_of(expanded, [])
-            results = request.results(outputs_root(), num_replicates)
+            request = request_of(expanded, [])
+            results = request.results(outputs_root())
             if len(results.with_data) < len(results.conditions):
                 raise NothingStored(experiment)  # of all conditions: claims compare them
-            claims = page_of(results, settings).claims
+            claims = page_of(results, request.settings).claims
             rows = [
                 (c.name, c.text, c.source, c.rule, c.evidence, str(c.size or "–"), c.n, c.verdict)
                 for c in claims

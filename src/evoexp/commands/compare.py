@@ -7,15 +7,12 @@ from pathlib import Path
 from evoexp.commands.arguments import option_words
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.commands.pack import unpacked
-from evoexp.commands.report import ReportRequest, chosen, folder_name
+from evoexp.commands.report import chosen, folder_name
 from evoexp.condition import Condition
 from evoexp.configuration.labels import SAME
 from evoexp.errors import SettingError
 from evoexp.report.pages import build, comparison, markdown
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.best_known import read_best_known, shipped_best_known
-from evoexp.report.results.given_data import of_given, read_given, strange_problems
-from evoexp.report.results.ioh_format import ioh_files
+from evoexp.report.results import comparison_files
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
 from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root
@@ -28,16 +25,18 @@ def main(arguments: argparse.Namespace) -> int:
     # readers would take older files in it for runs, too
     if arguments.ioh and folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise SettingError("--ioh", "a folder that is empty or not there yet", arguments.ioh)
-    files, request, settings, runs, strange = drawn(arguments)
+    files, request, runs, strange = drawn(arguments)
     page = build.write_report(files)
-    rows = comparison.rated(runs, settings)
+    rows = comparison.rated(runs, request.settings)
     if arguments.csv:
         write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:
         (latex,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
         write_file(Path(arguments.latex), latex)
     if arguments.ioh:
-        written = {folder / name: content for name, content in ioh_files(runs).items()}
+        written = {
+            folder / name: content for name, content in comparison_files.ioh_files(runs).items()
+        }
         for path in written:
             path.parent.mkdir(parents=True, exist_ok=True)
         write_files(written)
@@ -63,28 +62,28 @@ def main(arguments: argparse.Namespace) -> int:
 
 def drawn(
     arguments: argparse.Namespace,
-) -> tuple[build.ReportFiles, build.Request, ReportSettings, list[PlannerRuns], list[str]]:
+) -> tuple[build.ReportFiles, build.Request, list[PlannerRuns], list[str]]:
     """Draw the page that is asked for; return lines on problems that only given data know, too."""
-    given = read_given(arguments.data) if arguments.data else None
-    known = shipped_best_known()
+    given = comparison_files.read_given(arguments.data) if arguments.data else None
+    known = comparison_files.shipped_best_known()
     if arguments.best_known:
-        known |= read_best_known(arguments.best_known)
-    request, settings, planned = _asked(arguments)
+        known |= comparison_files.read_best_known(arguments.best_known)
+    request = _asked(arguments)
     if given:  # a page of its own
         name = f"{request.report_name}+given_{given.sha256[:8]}"
         words = f"{request.arguments} --data {shlex.quote(arguments.data)}".strip()
         request = request._replace(report_name=name, arguments=words)
-    found = request.results(outputs_root(), planned)
+    found = request.results(outputs_root())
     lengths = {key: each.length for key, each in known.items()}
     runs, strange = of_results(found.evolved, lengths), list[str]()
     if given:
-        strange = list(strange_problems(given, runs))
-        runs += of_given(given, runs)
-    page = comparison.page(found, settings, runs, given)
-    return build.page_files(request, page, found, settings), request, settings, runs, strange
+        strange = list(comparison_files.strange_problems(given, runs))
+        runs += comparison_files.of_given(given, runs)
+    page = comparison.page(found, request.settings, runs, given)
+    return build.page_files(request, page, found), request, runs, strange
 
 
-def _asked(arguments: argparse.Namespace) -> ReportRequest:
+def _asked(arguments: argparse.Namespace) -> build.Request:
     """Return the request of the page."""
     again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
     words = shlex.join([*arguments.overrides, *again])
@@ -102,5 +101,5 @@ def _asked(arguments: argparse.Namespace) -> ReportRequest:
             before = [rows[condition.id][0]] if condition.id in rows else []
             rows[condition.id] = SAME.join([*before, name]), condition
     folder = f"compare_{folder_name(names)}"
-    request = build.Request(folder, title, budget, tuple(rows.values()), words, None, "compare")
-    return ReportRequest(request, settings, num_replicates)
+    planned = tuple(rows.values()), settings, num_replicates
+    return build.Request(folder, title, budget, *planned, words, command="compare")

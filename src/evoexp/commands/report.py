@@ -10,20 +10,20 @@ import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 from evoexp.commands import site
 from evoexp.commands.arguments import is_override, option_words
 from evoexp.commands.command_parser import command_parser
 from evoexp.commands.console import say, say_each
 from evoexp.commands.pack import unpacked
+from evoexp.commands.stored_runs import stored_runs
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError, UnknownOption
 from evoexp.report.pages import build
-from evoexp.report.pages.home_page import summaries
+from evoexp.report.pages.html_page import summaries
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
@@ -33,22 +33,6 @@ CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
 MAX_NAMED = 4  # runs whose hashes a report's name spells out
 _HASH = re.compile("[0-9a-fA-F]{4,64}")
 _SILENT = ("experiment", "budget", "runner")  # overrides that a report's command need not repeat
-
-
-class ReportRequest(NamedTuple):
-    """A report before it is drawn."""
-
-    request: build.Request
-    settings: ReportSettings
-    num_replicates: int | None  # planned for every condition; None: as many as each one has
-
-    def files(self) -> build.ReportFiles:
-        """Draw it; nothing is written."""
-        return build.derived(self.request, self.settings, outputs_root(), self.num_replicates)
-
-    def write(self) -> Path:
-        """Draw and write it; return the path of its page."""
-        return build.write_report(self.files())
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -62,8 +46,8 @@ def main(arguments: argparse.Namespace) -> int:
         arguments.overrides = _with_claims(arguments.overrides)
     found = requests(arguments)
     if arguments.check:
-        return _check(request.files() for request in found)
-    say_each(request.write for request in found)
+        return _check(request.files(outputs_root()) for request in found)
+    say_each(functools.partial(request.write, outputs_root()) for request in found)
     return 0
 
 
@@ -159,12 +143,12 @@ def chosen(
     return {}, experiments, overrides, experiments[0].report
 
 
-def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
+def requests(arguments: argparse.Namespace) -> list[build.Request]:
     """Return a report of every named experiment, or a single report of all named runs."""
     runs, experiments, overrides, settings = chosen(arguments)
     if runs:
         name = folder_name([*runs], "_runs")
-        return [ReportRequest(build.Request(name, "", "", tuple(runs.items())), settings, None)]
+        return [build.Request(name, "", "", tuple(runs.items()), settings, None)]
     again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
     return [request_of(experiment, overrides, again) for experiment in experiments]
 
@@ -179,7 +163,7 @@ def folder_name(parts: Sequence[str], noun: str = "") -> str:
 
 def request_of(
     experiment: Experiment, overrides: Sequence[str], again: Sequence[str] = ()
-) -> ReportRequest:
+) -> build.Request:
     """Return the report of one experiment, whose command repeats the words that were typed.
 
     Behind the overrides come the words of the options, see `option_words`.
@@ -190,15 +174,16 @@ def request_of(
     words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
     words += [word for word in overrides if word.split("=")[0] not in _SILENT]
     words += again
-    request = build.Request(
+    return build.Request(
         experiment.report_name,
         experiment.name,
         experiment.budget,
         experiment.conditions,
+        experiment.report,
+        experiment.num_replicates,
         shlex.join(words),
         experiment.options,
     )
-    return ReportRequest(request, experiment.report, experiment.num_replicates)
 
 
 # all reports
@@ -219,55 +204,25 @@ def _drawn(planned: Sequence[PlannedReport], failed: list[str]) -> Iterator[buil
 
 
 def planned_reports(outputs: Path) -> Iterator[PlannedReport]:
-    """Yield the reports of all experiments that are stored, then the others that are there."""
-    seen = set()
-    for name in options("experiment"):
-        for budget in _budgets(outputs, name):
-            folder, words = name, [f"experiment={name}"]
-            if budget != "paper":
-                folder, words = f"{name}@{budget}", [*words, f"budget={budget}"]
-            seen.add(folder)
-            yield folder, functools.partial(_of_experiment, words)
+    """Yield the reports of experiments that stored runs name, then the others that are there."""
+    named = dict[tuple[str, str], set[str]]()  # (experiment, budget) → hashes of its runs
+    for _, run in stored_runs(outputs):
+        if isinstance(run, RunDirectory) and (run.completed() or run.failed()):
+            with contextlib.suppress(EvoexpError):  # damaged notes name none
+                notes = run.manifest()
+                origin = str(notes.get("experiment")), str(notes.get("budget"))
+                named.setdefault(origin, set()).add(run.condition_id)
+    known, seen = itertools.product(options("experiment"), options("budget")), set[str]()
+    for name, budget in (origin for origin in known if origin in named):
+        (experiment,) = compose.expand(words := [f"experiment={name}", f"budget={budget}"])
+        if named[name, budget].isdisjoint(condition.id for _, condition in experiment.conditions):
+            continue  # all of them were run with other settings
+        request = request_of(experiment, words)
+        seen.add(request.report_name)
+        yield request.report_name, functools.partial(request.files, outputs)
     for each in summaries(outputs / "reports"):
         if each.folder not in seen:
             yield each.folder, functools.partial(_again, each.folder, each.command)
-
-
-def _of_experiment(words: Sequence[str]) -> build.ReportFiles:
-    (experiment,) = compose.expand(words)
-    return request_of(experiment, words).files()
-
-
-def _budgets(outputs: Path, name: str) -> Iterator[str]:
-    """Yield the budgets at which an experiment was run: it began one of its runs, or all are there.
-
-    Experiments share conditions: one of them alone does not mean that all were asked for.
-    """
-    rows = [row for row in shipped() if row.experiment == name]
-    for budget in ("paper", "smoke"):
-        ids = {row.condition_id for row in rows if row.budget == budget}
-        if not rows:  # not shipped
-            (experiment,) = compose.expand([f"experiment={name}", f"budget={budget}"])
-            ids = {condition.id for _, condition in experiment.conditions}
-        runs = (RunDirectory(outputs, each) for each in ids)
-        begun = [run for run in runs if run.completed() or run.failed()]
-        own = [run for run in begun if _notes(run).get("experiment") == name]
-        if not own and len(begun) < max(len(ids), 1):
-            continue
-        # `quick` has the hashes of the paper's budget
-        commands = [str(_notes(run).get("command")) for run in own or begun]
-        is_quick = budget == "paper" and all("budget=quick" in each.split() for each in commands)
-        if is_quick:
-            (quick,) = compose.expand([f"experiment={name}", "budget=quick"])
-            is_quick = all(len(run.completed()) <= quick.num_replicates for run in own or begun)
-        yield "quick" if is_quick else budget
-
-
-def _notes(run: RunDirectory) -> dict[str, Any]:
-    """Return the notes on a run's origin; none if they are damaged."""
-    with contextlib.suppress(EvoexpError):
-        return run.manifest()
-    return {}
 
 
 def _again(folder: str, command: str) -> build.ReportFiles:
@@ -293,4 +248,4 @@ def _again(folder: str, command: str) -> build.ReportFiles:
         found = [] if arguments.all else requests(arguments)
         if len(found) != 1:
             raise no_command
-        return found[0].files()
+        return found[0].files(outputs_root())

@@ -141,7 +141,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
             return f"{directory / 'index.html'} (as it was)"
         from evoexp.commands.report import request_of  # pandas, where there is no need
 
-        page = request_of(experiment, *asked).write()
+        page = request_of(experiment, *asked).write(outputs_root())
         note.write_text(_drawn_from(experiment, asked, sources, directory))
         return str(page)
 

@@ -10,9 +10,8 @@ from evoexp.configuration.search_path import options
 from evoexp.errors import EvoexpError, NothingStored
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages.build import ReportFiles
-from evoexp.report.pages.home_page import Paper, StoredRun, home_page, summaries
-from evoexp.report.pages.html_page import HTML
-from evoexp.report.statistics.claim_rules import registered_rules
+from evoexp.report.pages.html_page import HTML, Paper, StoredRun, home_page, summaries
+from evoexp.report.statistics.judging import registered_rules
 from evoexp.store.files import write_file
 from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root

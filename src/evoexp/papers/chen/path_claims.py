@@ -12,10 +12,9 @@ from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results import run_measures
 from evoexp.report.results.run_measures import counted, planned
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import adjusted, by_column, compared
 from evoexp.report.statistics.inference import Proportion
-from evoexp.report.statistics.judging import Judge, evidence
+from evoexp.report.statistics.judging import Judge, Rules, evidence
 
 # name of a route (A, B, …; A is the most frequent) → keys of its paths
 Routes = dict[str, tuple[Any, ...]]

@@ -13,9 +13,9 @@ from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import BoolArray, FloatArray
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import by_column
 from evoexp.report.statistics.inference import Proportion, quantile
+from evoexp.report.statistics.judging import Rules
 
 MANY_QUERIES = 1000  # of coal: more than the pairs that may touch when an object is released
 REASONS = ("goal", "stagnation", "cap")  # why a search ends

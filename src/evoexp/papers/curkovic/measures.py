@@ -18,8 +18,8 @@ from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import counted, search_seconds, solved, summed, touches
 from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
 from evoexp.report.statistics import inference
-from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.inference import Proportion, quantile
+from evoexp.report.statistics.judging import Rules
 
 TOOL_SAMPLES = 20  # per segment, where end-effectors' distances from other robots are measured
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end

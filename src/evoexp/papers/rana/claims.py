@@ -14,10 +14,9 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import overridden, parameters, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
-from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import Comparison, Family, Measure
 from evoexp.report.statistics.inference import Proportion, fisher_family
-from evoexp.report.statistics.judging import Judge
+from evoexp.report.statistics.judging import Judge, Rules
 
 PRINTED = "as printed"  # label of the printed setting among the ablations
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim

@@ -1,16 +1,19 @@
-"""Convergence: a quantity against generations and evaluations, over replicates."""
+"""Costs over generations, over evaluations and over the settings of a sweep, with their effects."""
 
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import groups, marks, records, style
-from evoexp.report.figures.end_labels import name_curves
+from evoexp.report.figures.marks import name_curves, name_ends
+from evoexp.report.pages.swept import MOST_PANELS, Sweep, labelled
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.inference import quantiles
+from evoexp.report.statistics.comparisons import Values
+from evoexp.report.statistics.inference import quantile, quantiles
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
@@ -117,7 +120,6 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
 
 
 def _curves(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw medians as lines (the average dashed) and quartiles as bands."""
     across = _across(table)
     for (position, condition), rows in groups(table, ["position", "condition"]):
         colour = style.condition_colour(position)
@@ -157,3 +159,163 @@ def _across(table: pd.DataFrame) -> str:
 def _counts(curve: pd.DataFrame) -> str:
     low, high = int(curve["replicates"].min()), int(curve["replicates"].max())
     return f"n = {low}" if low == high else f"n = {low}…{high}"
+
+
+PER_LINE = 3  # panels side by side
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue (ITU-R BT.709)
+DARK = 0.46  # [-] luminance below which a cell is dark
+SETTLED = 0.05  # [-] of a run, after which the panels show all costs
+ORDINAL, PALEST = "viridis", 0.8  # colours of values that have an order, the palest to be read
+
+
+def grid_table(sweep: Sweep, values: Values) -> pd.DataFrame:
+    """Return median and quartiles of a quantity of each combination."""
+    found, last = [], len(sweep.settings) - 1
+    levels = [sweep.levels(k) for k in range(len(sweep.settings))]
+    for each in sweep.conditions:
+        if not each.results.done:
+            continue
+        own = values(each.results)
+        before = labelled(sweep, each.values[: max(last - 1, 0)])
+        panel = ", ".join(word for word in (each.base, before) if word)
+        x, y = each.values[last], each.values[last - 1] if last else ""
+        row = levels[last - 1].index(y) if last else 0
+        spread = (quantile(own, share) for share in (0.5, 0.25, 0.75))
+        found.append((panel, x, y, levels[last].index(x), row, *spread, len(own)))
+    names = ["panel", "x", "y", "column", "row", "median", "lower", "upper", "runs"]
+    return pd.DataFrame(found, columns=names).assign(
+        x_setting=sweep.settings[last], y_setting=sweep.settings[last - 1] if last else ""
+    )
+
+
+def draw_grid(table: pd.DataFrame, name: str) -> Figure:
+    """Draw a heat map of medians per panel, or, where one setting is swept, a curve."""
+    return _draw_curves(table, name) if (table["y"] == "").all() else _draw_maps(table, name)
+
+
+def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
+    panels = list(dict.fromkeys(table["panel"]))[:MOST_PANELS]
+    rows = int(table["row"].max()) + 1
+    figure, axes_of = style.panels(0.42 * rows + 1.15, len(panels), PER_LINE, 0.0)
+    finite = table.loc[np.isfinite(table["median"]), "median"]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
+    image = None
+    for axes, panel in zip(axes_of, panels, strict=True):
+        own = table[table["panel"] == panel]
+        cells = own.pivot(index="row", columns="column", values="median")
+        cells = cells.reindex(index=range(rows), columns=range(int(table["column"].max()) + 1))
+        shown = cells.to_numpy(np.float64)
+        finite_cells = np.where(np.isfinite(shown), shown, np.nan)
+        limits: dict[str, Any] = {"vmin": low, "vmax": high if high > low else low + 1.0}
+        image = axes.imshow(finite_cells, cmap="viridis_r", aspect="auto", **limits)
+        for cell in records(own):  # the median, white in dark cells
+            known = bool(np.isfinite(cell.median))
+            text = f"{cell.median:.4g}" if known else "∞"
+            is_dark = known and np.dot(LUMINANCE, image.to_rgba(cell.median)[:3]) < DARK
+            look: dict[str, Any] = {"color": "white" if is_dark else "black", "fontsize": 7.5}
+            axes.annotate(text, (cell.column, cell.row), ha="center", va="center", **look)
+        ticks = own.drop_duplicates("column").sort_values("column")
+        axes.set_xticks(ticks["column"], ticks["x"])
+        ticks = own.drop_duplicates("row").sort_values("row")
+        axes.set_yticks(ticks["row"], ticks["y"])
+        axes.set(title=panel, xlabel=table["x_setting"].iloc[0])
+        axes.grid(visible=False)
+        axes.tick_params(length=0)
+    for axes in filter(style.begins_line, axes_of):
+        axes.set_ylabel(table["y_setting"].iloc[0])
+    if image is not None:
+        figure.colorbar(image, ax=axes_of, label=f"{name} (median)", fraction=0.05, aspect=14)
+    return figure
+
+
+def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
+    figure, (axes,) = style.panels(3.2)
+    panels = list(dict.fromkeys(table["panel"]))
+    ends = []
+    for k, panel in enumerate(panels):
+        own = table[table["panel"] == panel].sort_values("column")
+        own = own[np.isfinite(own[["median", "lower", "upper"]]).all(axis=1)]
+        if own.empty:
+            continue
+        errors = [own["median"] - own["lower"], own["upper"] - own["median"]]
+        look: dict[str, Any] = {"color": style.condition_colour(k), "marker": "o", "ms": 4}
+        axes.errorbar(own["column"], own["median"], yerr=errors, capsize=2.0, **look)
+        last = own.iloc[-1]
+        place = float(last["column"]), float(last["median"])
+        ends.append((*place, panel, style.condition_colour(k)))
+    ticks = table.drop_duplicates("column").sort_values("column")
+    axes.set_xticks(ticks["column"], ticks["x"])
+    axes.margins(x=0.05)
+    axes.set(xlabel=table["x_setting"].iloc[0], ylabel=f"{name} (median, quartiles)")
+    if any(panels):
+        name_ends(axes, ends)
+    return figure
+
+
+def draw_effects(table: pd.DataFrame) -> Figure:
+    """Draw the median differences with their intervals, one panel per swept condition."""
+    bases = list(dict.fromkeys(table["base"]))[:MOST_PANELS]
+    rows = max(int((table["base"] == base).sum()) for base in bases)
+    figure, panels = style.panels(0.26 * rows + 1.0, len(bases), PER_LINE, 0.0)
+    for axes, base in zip(panels, bases, strict=True):
+        own = table[table["base"] == base].reset_index(drop=True)
+        finite = own[np.isfinite(own[["difference", "low", "high"]]).all(axis=1)]
+        errors = [finite["difference"] - finite["low"], finite["high"] - finite["difference"]]
+        look: dict[str, Any] = {"fmt": "o", "ms": 4, "capsize": 2.0, "color": style.NEUTRAL}
+        axes.errorbar(finite["difference"], finite.index, xerr=errors, **look)
+        marks.dashed(axes, 0.0)
+        names = [f"{r.setting}: {r.first} → {r.other}" for r in records(own)]
+        axes.set_yticks(range(len(own)), names if style.begins_line(axes) else [])
+        axes.set(title=base, xlabel="change of the cost", ylim=(len(own) - 0.5, -0.5))
+        axes.xaxis.set_major_locator(style.few_ticks())
+    return figure
+
+
+def facets_table(results: Results, sweep: Sweep) -> pd.DataFrame:
+    """Return the best cost so far of each combination."""
+    table = cost_table(results)
+    best = table[table["quantity"] == NAMES["best_cost"]]
+    of = {each.results.label: each for each in sweep.conditions}
+    levels = sweep.levels(len(sweep.settings) - 1)
+    best = best[best["condition"].isin(of.keys())]
+    swept = [of[label] for label in best["condition"]]
+    return best.assign(
+        base=[each.base for each in swept],
+        facet=[labelled(sweep, each.values[:-1]) for each in swept],
+        setting=sweep.settings[-1],
+        value=[each.values[-1] for each in swept],
+        level=[levels.index(each.values[-1]) for each in swept],
+    )
+
+
+def draw_facets(table: pd.DataFrame) -> Figure:
+    """Draw the panels, those of one condition in one scale; values stand at the ends of curves."""
+    shown = table.replace([np.inf, -np.inf], np.nan)
+    panels = list(dict.fromkeys(zip(shown["base"], shown["facet"], strict=True)))[:MOST_PANELS]
+    beside = len({facet for _, facet in panels})
+    per_line = beside if 1 < beside <= PER_LINE else min(PER_LINE, len(panels))
+    figure, axes_of = style.panels(2.35, len(panels), per_line, 0.3)
+    count = int(shown["level"].max()) + 1
+    colours = [mpl.colors.to_hex(c) for c in mpl.colormaps[ORDINAL](np.linspace(0, PALEST, count))]
+    for axes, (base, facet) in zip(axes_of, panels, strict=True):
+        of_base = shown[shown["base"] == base]
+        own, ends = of_base[of_base["facet"] == facet], []
+        for level, curve in groups(own, "level"):
+            axes.plot(curve["evaluations"], curve["median"], color=colours[level], linewidth=1.1)
+            last = curve.iloc[-1]
+            place = float(last["evaluations"]), float(last["median"])
+            ends.append((*place, str(last["value"]), colours[level]))
+        # costs but for the first ones, which are far above the others
+        settled = of_base[of_base["generation"] >= SETTLED * of_base["generation"].max()]["median"]
+        low, high = (settled.min(), settled.max()) if settled.notna().any() else (0.0, 1.0)
+        room = 0.05 * (high - low) or 1.0
+        axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=(low - room, high + room))
+        axes.set_title("\n".join(word for word in (base, facet) if word))
+        axes.set_xlabel("evaluations")
+        axes.set_ylabel("best cost so far" if style.begins_line(axes) else "")
+        axes.xaxis.set_major_locator(style.few_ticks())
+        style.shorten_thousands(axes.xaxis)
+        name_ends(axes, ends)
+    setting = table["setting"].iloc[0]
+    style.keys_below(figure, [style.key(f"medians; at the ends of curves: {setting}", lw=0)])
+    return figure

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
 from evoexp.report.figures import marks, style
-from evoexp.report.figures.end_labels import name_curves
+from evoexp.report.figures.marks import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
 from evoexp.report.statistics import problem_ranks
 from evoexp.report.statistics.inference import quantiles

@@ -97,7 +97,6 @@ def _bodies(recording: Recording, tick: int, element: str) -> Iterable[dict[str,
 
 
 def _still(recording: Recording) -> Iterable[dict[str, Any]]:
-    """Yield the rows of obstacles, targets and ways of tools."""
     for shape in recording.shapes:
         if shape.role == "obstacle":
             yield _row("obstacle", shape, recording.world_pose(shape, 0))
@@ -178,7 +177,6 @@ def draw_joints(table: pd.DataFrame) -> Figure:
 
 
 def _surface(row: Any, radius: float, middle: FloatArray) -> FloatArray:
-    """Return the triangles of a row in the world."""
     pose = np.array([getattr(row, name) for name in POSE], dtype=np.float64)
     size = np.array([getattr(row, name) for name in SIZE], dtype=np.float64)
     if row.kind == "half_space":

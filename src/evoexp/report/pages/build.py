@@ -11,9 +11,9 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.html_page import HTML, html_page
 from evoexp.report.pages.index import document
 from evoexp.report.pages.latex_tables import latex_tables
-from evoexp.report.pages.motion_pictures import players_of
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Drawing, Page
+from evoexp.report.pages.page_values import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.shipped import Option
@@ -31,7 +31,9 @@ class Request(NamedTuple):
     experiment: str  # name of the experiment; empty for runs given by their hashes
     budget: str  # name of the budget; empty for runs given by their hashes
     conditions: Sequence[tuple[str, Condition]]  # (label, condition) in the order of the experiment
-    # What was asked for, as words of the command line: "rana_planar budget=smoke"; derived if empty
+    settings: ReportSettings
+    num_replicates: int | None  # planned for every condition; None: as many as each one has
+    # What was asked for, as words of the command line: "rana_planar budget=smoke"; hashes if empty
     arguments: str = ""
     # Label → the options that were taken; None: those that the runs' manifests name
     options: Mapping[str, tuple[Option, ...]] | None = None
@@ -40,11 +42,8 @@ class Request(NamedTuple):
     @property
     def words(self) -> str:
         """Words of the command line that ask for this report."""
-        if self.arguments:
-            return self.arguments
-        if self.experiment and "+" not in self.report_name:
-            return self.experiment + f" budget={self.budget}" * (self.budget != "paper")
-        return " ".join(dict.fromkeys(condition.id[:12] for _, condition in self.conditions))
+        hashes = dict.fromkeys(condition.id[:12] for _, condition in self.conditions)
+        return self.arguments or " ".join(hashes)
 
     @property
     def hint(self) -> str:
@@ -53,11 +52,20 @@ class Request(NamedTuple):
             return f"evoexp run experiment={self.words}"
         return f"evoexp run {self.words}" if self.arguments else f"evoexp show {self.words}"
 
-    def results(self, outputs: Path, num_replicates: int | None) -> Results:
+    def results(self, outputs: Path) -> Results:
         """Read the stored results, see `gather`."""
         words = self.experiment, self.budget, self.hint
-        results = gather(outputs, self.conditions, num_replicates, *words, self.options)
+        results = gather(outputs, self.conditions, self.num_replicates, *words, self.options)
         return results._replace(as_written="+" not in self.report_name)
+
+    def files(self, outputs: Path) -> "ReportFiles":
+        """Draw the report as it follows from the outputs; nothing is written."""
+        found = self.results(outputs)
+        return page_files(self, page_of(found, self.settings), found)
+
+    def write(self, outputs: Path) -> Path:
+        """Draw the report and write it; return the path of its `index.html`."""
+        return write_report(self.files(outputs))
 
 
 class ReportFiles(NamedTuple):
@@ -67,19 +75,9 @@ class ReportFiles(NamedTuple):
     files: dict[str, bytes]  # name → content
 
 
-def derived(
-    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
-) -> ReportFiles:
-    """Return a report as it follows from the outputs; nothing is written."""
-    found = request.results(outputs, num_replicates)
-    return page_files(request, page_of(found, settings), found, settings)
-
-
-def page_files(
-    request: Request, page: Page, found: Results, settings: ReportSettings
-) -> ReportFiles:
+def page_files(request: Request, page: Page, found: Results) -> ReportFiles:
     """Draw a page's figures and return all its files."""
-    files: dict[str, bytes] = {}
+    files, settings = dict[str, bytes](), request.settings
     for drawing in page.drawings:
         files |= _drawn(drawing, settings)
     players = players_of(page.drawings, found.experiment)
@@ -134,18 +132,14 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
         "data": {
             "file": f"{drawing.stem}.csv",
             "rows": len(table),
-            "sha256": _sha256(rows),
+            "sha256": hashlib.sha256(rows).hexdigest(),
             # kinds of its columns, and what they hold
             "columns": {
                 str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
             },
             "description": drawing.columns,
         },
-        "files": {name: _sha256(content) for name, content in pictures.items()},
+        "files": {name: hashlib.sha256(image).hexdigest() for name, image in pictures.items()},
     }
     text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -17,8 +17,7 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.best_known import shipped_best_known
-from evoexp.report.results.given_data import GivenData
+from evoexp.report.results.comparison_files import GivenData, shipped_best_known
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results

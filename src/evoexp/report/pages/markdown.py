@@ -6,12 +6,12 @@ import re
 import string
 from collections.abc import Iterable, Sequence
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from evoexp.report.pages.page_parts import Document
-from evoexp.report.statistics.inference import Interval, Proportion, Spread
+from evoexp.report.statistics.inference import Interval, Spread
 from evoexp.report.statistics.inference import spread as spread_of
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
@@ -100,7 +100,7 @@ class Sentence(string.Formatter):
     def convert_field(self, value: Any, conversion: str | None) -> Any:
         """Return a value as the letter behind its exclamation mark asks."""
         if conversion == "i":
-            return _Shared(value, self.words["confidence"])
+            return functools.partial(value.with_interval, self.words["confidence"])
         if conversion in ("d", "m"):
             found = spread_of(value)
             return number(found.median) if conversion == "d" else spread(found)
@@ -108,15 +108,11 @@ class Sentence(string.Formatter):
             return (number if conversion == "n" else p_value)(float(value))
         return super().convert_field(value, conversion)
 
-
-class _Shared(NamedTuple):
-    """A proportion that is written with its interval."""
-
-    proportion: Proportion
-    confidence: float
-
-    def __format__(self, decimals: str) -> str:
-        return self.proportion.with_interval(self.confidence, int(decimals or 0))
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        """Return a value as text; of a proportion with its interval the format is its decimals."""
+        if isinstance(value, functools.partial):
+            return value(int(format_spec or 0))
+        return super().format_field(value, format_spec)
 
 
 def p_value(p: float) -> str:

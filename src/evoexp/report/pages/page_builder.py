@@ -5,9 +5,8 @@ from functools import partial
 from typing import Any, cast
 
 from evoexp.report.pages import GENERIC, page_registration, swept
-from evoexp.report.pages.judged_entries import judged_as_written
-from evoexp.report.pages.motion_pictures import best_motions
-from evoexp.report.pages.page_file import PageFile, own_pages, read_page_file
+from evoexp.report.pages.judged_claims import Headline, judged_as_written
+from evoexp.report.pages.page_file import PageFile, Scope, own_pages, read_page_file
 from evoexp.report.pages.page_parts import (
     Claim,
     Drawing,
@@ -17,20 +16,11 @@ from evoexp.report.pages.page_parts import (
     Table,
     quantity,
 )
-from evoexp.report.pages.page_scope import Scope
-from evoexp.report.pages.readings import Headline
+from evoexp.report.pages.page_values import best_motions
+from evoexp.report.pages.swept import sweep_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import sweep_of
-from evoexp.report.statistics.comparisons import (
-    Comparison,
-    FamilyComparison,
-    Measure,
-    compare_families,
-    compared,
-    compared_with_controls,
-    headed,
-)
+from evoexp.report.statistics import comparisons
 from evoexp.report.statistics.judging import left_out
 
 TITLE = "{paper}: {experiment}"
@@ -167,7 +157,7 @@ class PageBuilder:
                 else:
                     yield scope.text(entry["title"]), scope.text(finding)
 
-    def comparisons(self, entry: Entry) -> Iterator[tuple[str, tuple[Comparison, ...]]]:
+    def comparisons(self, entry: Entry) -> Iterator[tuple[str, tuple[comparisons.Comparison, ...]]]:
         """Yield (heading, comparisons)."""
         results, settings = self.scope["results"], self.scope["settings"]
         for each in entry.get("comparisons", ()):
@@ -175,7 +165,7 @@ class PageBuilder:
                 yield from self.scope[each]
             elif "controls" in each:
                 own = [measure(self.scope, *row) for row in each["controls"]]
-                yield from compared_with_controls(results, settings, own)
+                yield from comparisons.compared_with_controls(results, settings, own)
             elif "pairs" in each:
                 by_label = {c.label: c for c in results.with_data}
                 known = [pair for pair in self.scope[each["pairs"]] if by_label.keys() >= {*pair}]
@@ -183,9 +173,13 @@ class PageBuilder:
                 for row in each["measures"] if pairs else ():
                     of = measure(self.scope, *row)
                     lower, named = of.lower_is_better, "{0.label} against {1.label}".format
-                    rows = compared(pairs, of.values, settings, lower_is_better=lower, named=named)
+                    rows = comparisons.compared(
+                        pairs, of.values, settings, lower_is_better=lower, named=named
+                    )
                     yield f"{of.name}: {each['heading']}", rows
-        yield from headed(self.scope["compared"])
+        for one in self.scope["compared"]:
+            if one.rows:
+                yield f"{one.measure.name}: {one.family.name} against …", one.rows
 
     def items(self, entry: Entry, scope: Scope | None = None) -> Iterator[Scope]:
         """Yield the scope of every item that an entry is repeated for, or the page's."""
@@ -280,19 +274,19 @@ def _argument(scope: Scope, value: Any) -> Any:
 
 def measure(
     scope: Scope, name: str, values: str, unit: str = "–", better: str = "lower"
-) -> Measure:
+) -> comparisons.Measure:
     """Return a quantity that conditions are compared in: its name, values, unit, and order."""
-    return Measure(scope.text(name), scope[values], unit, better == "lower")
+    return comparisons.Measure(scope.text(name), scope[values], unit, better == "lower")
 
 
-def family_comparisons(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
+def family_comparisons(scope: Scope, page: Entry) -> tuple[comparisons.FamilyComparison, ...]:
     """Return the comparisons of families that a page asks for, which functions name `compared`."""
-    found: list[FamilyComparison] = []
+    found: list[comparisons.FamilyComparison] = []
     for entry in page.get("comparisons", ()):
         if isinstance(entry, Mapping) and "families" in entry:
             rows = entry["measures"]
             own = scope[rows] if isinstance(rows, str) else [measure(scope, *row) for row in rows]
-            found += compare_families(scope[entry["families"]], own, scope["settings"])
+            found += comparisons.compare_families(scope[entry["families"]], own, scope["settings"])
     return tuple(found)
 
 

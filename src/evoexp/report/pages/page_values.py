@@ -1,21 +1,20 @@
-"""Values that every page may name: the parts of its results and settings, its comparisons."""
+"""Values that every page may name: of results and settings, comparisons, and motions."""
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.report.pages.page_parts import PlayedRun, Quantity, quantity
-from evoexp.report.results.run_measures import search_seconds
-from evoexp.report.results.stored_results import Results
-from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import (
-    Comparison,
-    Family,
-    FamilyComparison,
-    by_column,
-    rows_by_name,
-)
+from evoexp.playback import player_page
+from evoexp.playback.recording import Heading, NoMotion, Recording, record
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Drawing, PlayedRun, Player, Quantity, quantity
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.run_measures import search_seconds, success
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import comparisons, judging
+from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 from evoexp.store.messages import TERM
 
 FEW = 4  # conditions whose average costs can be drawn beside the best ones
@@ -50,7 +49,9 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "several": lambda results: len(results.with_data) > 1,  # there is something to compare
     "are_few": lambda results: len(results.evolved) <= FEW,
-    "whole": lambda conditions: (Family.of(conditions),),  # the first one against all others
+    "whole": lambda conditions: (
+        comparisons.Family.of(conditions),
+    ),  # the first one against all others
     "played": lambda condition: (PlayedRun(condition, condition.best_replicate),),
     "judge": lambda results, settings, rules: judging.judge(results, settings, rules),
     "confidence": lambda settings: settings.confidence,  # of every interval, in (0, 1)
@@ -70,12 +71,174 @@ def terms(results: Results) -> Iterator[Quantity]:
             name, _, unit = name.rpartition(" ")
         elif "distance" in term or "clearance" in term:
             unit = results.with_data[0].length_unit or "–"
-        yield quantity(results, name, unit, by_column(column))
+        yield quantity(results, name, unit, comparisons.by_column(column))
 
 
 def effect_rows(
-    compared: tuple[FamilyComparison, ...], names: Mapping[str, str]
-) -> dict[str, tuple[Comparison, ...]]:
+    compared: tuple[comparisons.FamilyComparison, ...], names: Mapping[str, str]
+) -> dict[str, tuple[comparisons.Comparison, ...]]:
     """Return the comparisons of families by quantity: of all, or of those that have a name."""
-    rows = rows_by_name(compared)
+    rows = comparisons.rows_by_name(compared)
     return {shown: rows[name] for name, shown in names.items() if name in rows} if names else rows
+
+
+# conditions of which every pair is tabled; of more, the first against each other one
+MOST_PAIRED = 6
+
+
+EFFORTS: dict[str, comparisons.Values] = {  # quantities that every planner records; lower is better
+    "best cost": comparisons.by_column("best_cost"),
+    "evaluations": comparisons.by_column("evaluations"),
+    "collision queries": comparisons.by_column("collision_queries"),
+    "CPU time, search [s]": search_seconds,
+}
+SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
+    "solved": success,
+    # of the motions that the exact verdict judged
+    "certified": lambda c: Proportion(c.verdicts.certified, c.verdicts.judged),
+    "required margin kept": lambda c: Proportion(c.verdicts.with_margin, c.verdicts.judged),
+}
+
+
+def differing(results: Results) -> dict[str, comparisons.Values]:
+    """Return the quantities that are not the same in every run, by name."""
+    return {
+        name: values
+        for name, values in EFFORTS.items()
+        if len(np.unique(np.concatenate([values(c) for c in results.evolved]))) > 1
+    }
+
+
+def _pairs(results: Results) -> list[comparisons.Pair]:
+    """Return the pairs that tables hold; references have no seeds and stand aside."""
+    first, *others = results.evolved
+    if len(others) < MOST_PAIRED:
+        return list(itertools.combinations(results.evolved, 2))
+    return [(first, other) for other in others]
+
+
+def pairs_of_conditions(
+    results: Results, settings: ReportSettings, differing: dict[str, comparisons.Values]
+) -> tuple[tuple[str, tuple[comparisons.Comparison, ...]], ...]:
+    """Compare pairs in every quantity in which they differ; p-values are adjusted within each."""
+    of = "pairs of conditions"
+    if len(results.evolved) > MOST_PAIRED:
+        of = f"{results.evolved[0].label} against each other condition"
+    found = (
+        (f"{name}: {of}", comparisons.compared(_pairs(results), values, settings, named=_named))
+        for name, values in differing.items()
+    )
+    return tuple((heading, rows) for heading, rows in found if rows)
+
+
+def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ...]]:
+    """Return shares of runs with intervals, a row per condition."""
+    return [
+        (c.label, *(of(c).with_interval(confidence) for of in SHARES.values()))
+        for c in results.with_data
+    ]
+
+
+def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]]:
+    """Return how far shares differ from each other; no row of one that is the same everywhere."""
+    rows: list[tuple[str, ...]] = []
+    for name, of in SHARES.items():
+        found = [(a, b, of(a), of(b)) for a, b in _pairs(results) if of(a).total and of(b).total]
+        if len({p.share for _, _, *both in found for p in both}) < 2:
+            continue
+        p_values = [fisher_exact(one, two) for _, _, one, two in found]
+        for (a, b, one, two), p, adjusted in zip(found, p_values, holm(p_values), strict=True):
+            between = (one.share - two.share, *newcombe(one, two, confidence))
+            difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
+            points = f"{difference} [{low}, {high}]".replace("-", "−")
+            tests = markdown.p_value(p), markdown.p_value(adjusted)
+            rows.append((name, _named(a, b), points, *tests))
+    return rows
+
+
+def _named(first: ConditionResults, second: ConditionResults) -> str:
+    return f"{first.label} against {second.label}"
+
+
+JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`
+VERDICTS = {True: "certified", False: "refuted", None: "undecided"}
+MOST_SHOWN = 4  # conditions whose motions are shown, those with the least best cost
+
+
+class ShownMotion(NamedTuple):
+    """The best motion of a condition."""
+
+    condition: ConditionResults  # the condition
+    recording: Recording  # the motion of its best replicate
+
+
+def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, int], Player]:
+    """Return the players of all motions that figures show, each once, by the keys of the runs."""
+    players = dict[tuple[str, int], Player]()
+    for c, k in {run.key: run for drawing in drawings for run in drawing.plays}.values():
+        title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
+        if motion := _recorded(c, k, title):
+            words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
+            file = f"motion_{c.hash12}_{k:04d}.html"
+            players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
+    return players
+
+
+def _recorded(c: ConditionResults, replicate: int, title: str) -> Recording | None:
+    try:
+        return record(c.condition, c.solutions[replicate], Heading(title, replicate))
+    except NoMotion:
+        return None
+
+
+def best_motions(results: Results) -> list[ShownMotion]:
+    """Return the motions of the conditions with the least costs, at most `MOST_SHOWN`."""
+    motions = (
+        (c, _recorded(c, c.best_replicate, c.label))
+        for c in sorted(results.with_data, key=_best_cost)
+    )
+    shown = itertools.islice((ShownMotion(c, own) for c, own in motions if own), MOST_SHOWN)
+    return sorted(shown, key=lambda each: results.with_data.index(each.condition))
+
+
+def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
+    """Return the values that figures of motions show, by name.
+
+    `best` is the motion of the least cost alone, `covered` are those with the covers of their
+    bodies, one per robot that has any.
+    """
+    covered: dict[object, tuple[ShownMotion, Sequence[Any]]] = {}
+    for each in best_motions:
+        planner, problem = each.condition.prepared
+        if covers := tuple(planner.covers(problem)):
+            key = each.condition.robot, len(covers)
+            covered.setdefault(key, (each, covers))
+    best = sorted(best_motions, key=lambda each: _best_cost(each.condition))[:1]
+    return {
+        "titled": [
+            (f"{c.label}: {VERDICTS[recording.verdict.certified]}", recording)
+            for c, recording in best_motions
+        ],
+        "conditions": [each.condition for each in best_motions],
+        "runs": [PlayedRun(c, own.heading.replicate) for c, own in best_motions],
+        "best": [each.recording for each in best],
+        "best_condition": [each.condition for each in best],
+        "covered": [(own.condition.label, own.recording, rows) for own, rows in covered.values()],
+        "covered_conditions": [own.condition for own, _ in covered.values()],
+    }
+
+
+def notes(best_motions: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
+    """Return (conditions, note): the notes on the conditions whose motions are shown."""
+    labels: dict[str, list[str]] = {}
+    for each in best_motions:
+        for note in each.condition.condition.notes():
+            own = labels.setdefault(note, [])
+            if each.condition.label not in own:
+                own.append(each.condition.label)
+    return tuple((", ".join(own), note) for note, own in labels.items())
+
+
+def _best_cost(condition: ConditionResults) -> float:
+    cost = float(condition.summaries["best_cost"].astype("float64").min())
+    return cost if np.isfinite(cost) else np.inf

@@ -163,39 +163,31 @@ def _setting(
     entries: dict[str, Entry],
     otherwise: str,
     taken: dict[str, Option],
+    is_of_file: bool = False,
 ) -> Iterator[Parameter]:
-    """Yield a setting; of a component in a component its settings."""
+    """Yield a setting, part by part; lists of plain values are one part.
+
+    `is_of_file` tells that it stands beside the hash of a file, and so may be the file's content.
+    """
     reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
     if reference and isinstance(value, dict):
         yield from _component(reference[1], value, taken)
-    elif isinstance(value, dict) and TARGET in value:
+    elif isinstance(value, dict):
         for name, item in value.items():
             if name not in (TARGET, "revision"):
-                yield from _setting(group, f"{key}.{name}", item, entries, otherwise, taken)
-    else:
-        leaves = dict(_flat(value, key))
-        for path, leaf in leaves.items():
-            # the hash of a file, or beside one in the item of a list
-            item = f"{path.rpartition('.')[0]}.{FILE}.{SHA256}"
-            is_of_file = path.endswith(f".{SHA256}") or item in leaves
-            unknown = OF_FILE if path not in entries and is_of_file else otherwise
-            yield _parameter(f"{group}.{path}", leaf, entries.get(path), unknown)
-        items = {path.split("]")[0] for path in entries if path.startswith(f"{key}[")}
-        if isinstance(value, list) and len(items) > len(value):  # a list cut short
-            yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
-
-
-def _flat(value: Any, prefix: str) -> Iterator[tuple[str, Any]]:
-    """Yield (dotted key, leaf) of canonical data; lists of plain values are leaves."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            if key != "revision" and not (prefix and key == TARGET):
-                yield from _flat(item, f"{prefix}.{key}" if prefix else key)
+                inner = f"{key}.{name}", item, entries, otherwise, taken, FILE in value
+                yield from _setting(group, *inner)
     elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
         for k, item in enumerate(value):
-            yield from _flat(item, f"{prefix}[{k}]")
+            inner = f"{key}[{k}]", item, entries, otherwise, taken, is_of_file
+            yield from _setting(group, *inner)
     else:
-        yield prefix, value
+        is_unknown = key not in entries and (is_of_file or key.endswith(f".{SHA256}"))
+        unknown = OF_FILE if is_unknown else otherwise
+        yield _parameter(f"{group}.{key}", value, entries.get(key), unknown)
+    items = {path[len(key) :].split("]")[0] for path in entries if path.startswith(f"{key}[")}
+    if isinstance(value, list) and len(items) > len(value):  # a list cut short
+        yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
 
 
 def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Parameter:

@@ -85,13 +85,6 @@ def compare_families(
     )
 
 
-def headed(found: Iterable[FamilyComparison]) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Return comparisons with their headings, as a page takes them; none without rows."""
-    return tuple(
-        (f"{one.measure.name}: {one.family.name} against …", one.rows) for one in found if one.rows
-    )
-
-
 def rows_by_name(found: Iterable[FamilyComparison]) -> dict[str, tuple[Comparison, ...]]:
     """Return the rows of all families together, by the name of their quantity."""
     rows: dict[str, tuple[Comparison, ...]] = {}

@@ -1,19 +1,107 @@
-"""Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
+"""Claims of papers, the rules by which they are judged, their evidence and their verdicts.
 
+The format of rules as data stands at the head of `claim_kinds.yaml` beside this module.
+"""
+
+import collections
+import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple, cast
 
-from evoexp.registry import CLAIMS, names, registered
+import yaml
+
+from evoexp.registry import CLAIMS, Registration, names, registered
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import option, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules, registered_rules
 from evoexp.report.statistics.comparisons import Comparison, Values, compared
 from evoexp.report.statistics.inference import Proportion, fisher_exact, newcombe, runs_for_shares
 from evoexp.shipped import config_directory, shipped
+
+OWN = "own"
+KINDS: dict[str, dict[str, Any]] = yaml.safe_load(
+    Path(__file__).with_name("claim_kinds.yaml").read_text(encoding="utf-8")
+)
+
+
+class Rule(NamedTuple):
+    """A claim of a paper, and the rule by which it is judged."""
+
+    name: str  # of the claim: `free_at_via_points`
+    claim: str  # the claim in our words; {words} are filled in where it is judged
+    source: str  # where the paper makes it
+    kind: str  # one of `KINDS`
+    reproduced: str  # when the claim is reproduced, in words
+    contradicted: str  # when it is contradicted, in words; empty: wherever it is not reproduced
+    limits: Mapping[str, float]  # numbers that the rule needs, by name
+    experiments: tuple[str, ...]  # names of the experiments that judge it
+    evidence: str = ""  # the numbers in a sentence, as `markdown.filled` takes it
+    equal: str = ""  # when both sides are practically equal, in words
+
+    def about(self, words: dict[str, object] | None = None) -> "Rule":
+        """Return the rule with its words in braces filled in, where no judge gives any with "…"."""
+        limits: dict[str, object] = {name: f"{limit:g}" for name, limit in self.limits.items()}
+        unknown = collections.defaultdict[str, object](lambda: "…")
+        known = collections.ChainMap(limits, unknown if words is None else words)
+        fields = ("claim", "source", "reproduced", "contradicted", "equal")
+        return self._replace(**{name: getattr(self, name).format_map(known) for name in fields})
+
+    @property
+    def text(self) -> str:
+        """The rule in one sentence."""
+        verdicts = {
+            "reproduced": self.reproduced,
+            "practically equal": self.equal,
+            "contradicted": self.contradicted,
+        }
+        return "; ".join(f"{verdict} if {words}" for verdict, words in verdicts.items() if words)
+
+
+Rules = Mapping[str, Rule]
+NO_RULES: Rules = MappingProxyType({})
+
+
+@functools.cache
+def read_rules(path: Path) -> Rules:
+    """Read the claims of a file.
+
+    Raises:
+        ValueError: If an entry lacks a key, has an unknown key, or another kind than `KINDS`.
+    """
+    rules = {}
+    for name, entry in yaml.safe_load(path.read_text(encoding="utf-8")).items():
+        missing = {"claim", "source", "kind", "experiments"} - entry.keys()
+        unknown = entry.keys() - ({*Rule._fields} - {"name"})
+        if missing or unknown or entry["kind"] not in KINDS:
+            raise ValueError(
+                f"{name}: must have claim, source, experiments, a kind out of {', '.join(KINDS)}; "
+                f"missing: {sorted(missing)}, unknown: {sorted(unknown)}, kind: {entry.get('kind')}"
+            )
+        own = "reproduced" in entry
+        if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
+            must = f"a rule of kind {OWN}, and no other, says when it is reproduced"
+            raise ValueError(f"{name}: {must}")
+        words = {"reproduced": "", "contradicted": "", **KINDS[entry["kind"]], **entry}
+        least = {"equal": words.pop("least")} if "least" in words else {}
+        words["source"], words["experiments"] = str(entry["source"]), tuple(entry["experiments"])
+        words["limits"] = MappingProxyType(least | entry.get("limits", {}))
+        rules[name] = Rule(name=name, **words)
+    return MappingProxyType(rules)
+
+
+def registered_rules(registration: Registration) -> Rules:
+    """Return the rules that a package registers: as a file, or as the value of a module."""
+    if registration.file is None:
+        return cast(Rules, registration.load())
+    with resources.as_file(registration.file) as path:
+        return read_rules(path)
+
 
 REPRODUCED, CONTRADICTED, EQUAL = "reproduced", "contradicted", "practically equal"
 UNDECIDED, NOT_JUDGED = "undecided", "not judged"
@@ -161,7 +249,6 @@ class Hearing(NamedTuple):
 
 
 def _least_effect(rows: Sequence[Comparison]) -> EffectSize | None:
-    """Return the least A12 of some comparisons."""
     effects = sorted((row.better for row in rows), key=lambda each: each.a12)
     return next((EffectSize("A12", each.a12, *each.interval, 0.5) for each in effects), None)
 
@@ -249,11 +336,6 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
             if results.experiment in rule.experiments and rule.name not in known:
                 told = "not among its conditions: " + ", ".join(sorted(missing))
                 yield Hearing(rule.about(), "", 0.0).made(told, "0", verdict)
-
-
-def fisher_evidence(one: Proportion, two: Proportion) -> str:
-    """Return the test of two proportions in words: "Fisher's exact p = 0.02"."""
-    return f"Fisher's exact p = {markdown.p_value(fisher_exact(one, two))}"
 
 
 def evidence(comparison: Comparison, better: str) -> str:

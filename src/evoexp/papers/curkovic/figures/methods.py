@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.claims import PAIRS
 from evoexp.report.figures import groups, marks, style
-from evoexp.report.figures.effects import draw_box
+from evoexp.report.figures.side_by_side import draw_box
 from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import quantile, quantiles

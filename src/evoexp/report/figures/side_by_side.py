@@ -1,4 +1,4 @@
-"""Sweeps: quantities of all conditions side by side, and effect sizes of the first condition."""
+"""Conditions side by side: values and shares of runs, effect sizes, numbers of every reading."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, style
+from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.comparisons import Comparison, Values
-from evoexp.report.statistics.inference import quantile
+from evoexp.report.statistics.inference import Proportion, quantile, spread
+from evoexp.report.statistics.judging import CONTRADICTED, EQUAL, REPRODUCED
 
 JITTER = 0.16  # [rows] half the width over which points are spread
 POINTS = 50  # up to so many finite values every one is shown
@@ -158,4 +159,137 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     keys = style.key(f"adjusted p < {level:g}", **dot), style.key(f"≥ {level:g}", **dot, **OPEN)
     is_clear = table["p_adjusted"] < level
     style.keys_below(figure, [keys[k] for k in (0, 1) if (is_clear == (k == 0)).any()])
+    return figure
+
+
+MARGIN = 0.08  # [-] of the panels' span, beyond the intervals
+NEARLY_ALL = 60.0  # [%] a span from which on the axis has a number at every quarter
+
+
+def shares_table(
+    rows: Sequence[tuple[str, int, str, Proportion]],
+    printed: Mapping[str, float],
+    confidence: float,
+) -> pd.DataFrame:
+    """Return shares of runs with Wilson's intervals, and those that a paper prints, by quantity.
+
+    The rows are (quantity, position, condition, how many).
+    """
+    names = ["quantity", "position", "condition", "having", "total", "share", "lower", "upper"]
+    table = pd.DataFrame(
+        [(*given, *p, p.share, *p.interval(confidence)) for *given, p in rows], columns=names
+    )
+    return table.assign(printed=table["quantity"].map(dict(printed)).astype("float64"))
+
+
+def draw_shares(table: pd.DataFrame) -> Figure:
+    """Draw one panel per quantity, one row per condition, in one scale [%]."""
+    quantities = list(dict.fromkeys(table["quantity"]))
+    labels = dict(zip(table["position"], table["condition"], strict=True))
+    rows_of = {position: row for row, position in enumerate(sorted(labels))}
+    figure, panels = style.panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
+    known = 100 * table.loc[table["total"] > 0, ["lower", "upper", "printed"]].to_numpy(np.float64)
+    low, high = (np.nanmin(known), np.nanmax(known)) if known.size else (0.0, 100.0)
+    beyond = MARGIN * max(high - low, 1.0)
+    for axes, quantity in zip(panels, quantities, strict=True):
+        every = table[table["quantity"] == quantity]
+        own = every[every["total"] > 0]
+        for position, rows in groups(every, "position"):
+            colour, y = style.row_colour(int(position), len(labels)), rows_of[position]
+            if rows["total"].iloc[0]:
+                axes.hlines(
+                    y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
+                )
+                axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
+            counts = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
+            marks.beside(axes, y, counts, 1.0)
+        if len(own):
+            for printed in own["printed"].dropna().unique():
+                marks.dashed(axes, 100 * printed)
+        axes.set_xlim(low - beyond, high + beyond)
+        is_wide = high - low >= NEARLY_ALL
+        axes.xaxis.set_major_locator(MultipleLocator(25.0) if is_wide else style.few_ticks())
+        axes.set_xlabel("share of runs [%]")
+        axes.set_title(quantity, fontsize=7.5)
+    panels[0].set_yticks(list(rows_of.values()), [labels[position] for position in rows_of])
+    panels[0].set_ylim(len(labels) - 0.5, -0.5)
+    return figure
+
+
+OTHERWISE = "undecided or not judged"
+MARKS: dict[str, dict[str, Any]] = {
+    REPRODUCED: {"marker": "o", "mfc": style.ARM_COLOURS[0], "mec": style.ARM_COLOURS[0]},
+    EQUAL: {"marker": "s", "mfc": "white", "mec": style.ARM_COLOURS[0]},
+    CONTRADICTED: {"marker": "X", "mfc": style.ARM_COLOURS[1], "mec": style.ARM_COLOURS[1]},
+    OTHERWISE: {"marker": "o", "mfc": "white", "mec": style.FAINT},
+}
+
+
+def specification_table(judged: Sequence[Any], headline: Any) -> pd.DataFrame:
+    """Return one row per reading of a headline claim, of `judged_claims.Judged`.
+
+    Where a rule has no number that decides, the row holds median and quartiles of the quantity.
+    """
+    rows = []
+    for one in judged:
+        if one.headline is headline:
+            size, name = one.claim.size, headline.quantity
+            numbers: tuple[float, ...] = (*spread(headline.values(one.condition))[:3], np.nan)
+            if size is not None:
+                name, numbers = size.name, (size.value, size.low, size.high, size.neutral)
+            reading, is_first = (
+                one.family.reading(one.condition),
+                one.condition is one.family.shipped,
+            )
+            family, verdict = one.family.shipped.label, one.claim.verdict
+            rows.append((family, reading, is_first, name, *numbers, verdict))
+    names = ["family", "reading", "default", "quantity", "value", "low", "high", "neutral"]
+    return pd.DataFrame(rows, columns=[*names, "verdict"])
+
+
+def draw_specification(table: pd.DataFrame) -> Figure:
+    """Draw readings sorted by the number that decides, families one below the other.
+
+    Args:
+        table: Of `specification_table`; infinite values stand at the right edge, as "never".
+    """
+    numbers = table[["value", "low", "high", "neutral"]].to_numpy(np.float64)
+    finite = numbers[np.isfinite(numbers)]
+    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
+    room = 0.08 * (high - low) or 0.5
+    edge, families = high + room, list(dict.fromkeys(table["family"]))
+    labels = dict[float, tuple[str, bool]]()  # place of a line → its label, whether it is bold
+    place = 0.0
+    figure, (axes,) = style.panels(0.2 * (len(table) + 1.5 * len(families)) + 1.2)
+    for family in families:
+        rows = table[table["family"] == family].sort_values(["value", "reading"], kind="stable")
+        if len(families) > 1:
+            labels[place] = f"{family}:", False
+            place += 1.0
+        first = place
+        for row in records(rows):
+            labels[place] = row.reading, row.default
+            mark = MARKS.get(row.verdict, MARKS[OTHERWISE])
+            ends = [min(end, edge) for end in (row.low, row.high)]
+            axes.hlines(place, *ends, color=mark["mec"], linewidth=1.4)
+            axes.plot(min(row.value, edge), place, zorder=3, ms=5, **mark)
+            if not np.isfinite(row.value):
+                beside: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points"}
+                axes.annotate("never", (edge, place), va="center", fontsize=6.5, **beside)
+            place += 1.0
+        neutral = rows["neutral"].iloc[0]
+        if np.isfinite(neutral):
+            lines: dict[str, Any] = {"color": style.FAINT, "ls": (0, (4, 2)), "lw": 0.9}
+            axes.vlines(neutral, first - 0.5, place - 0.5, **lines)
+        place += 0.5
+    axes.set_xlim(low - room, edge + (0.25 * (edge - low) if np.isinf(numbers).any() else 0))
+    axes.xaxis.set_major_locator(style.few_ticks())
+    style.shorten_thousands(axes.xaxis)
+    axes.set_xlabel(", ".join(dict.fromkeys(table["quantity"])))
+    axes.set_yticks(list(labels), [label for label, _ in labels.values()])
+    for tick, (_, is_bold) in zip(axes.get_yticklabels(), labels.values(), strict=True):
+        tick.set_fontweight("bold" if is_bold else "normal")
+    axes.set_ylim(place - 1.0, -0.6)
+    entries = [style.key(label, ls="", ms=5, **look) for label, look in MARKS.items()]
+    style.keys_below(figure, entries)
     return figure

@@ -1,0 +1,275 @@
+"""Files that a comparison takes and gives: best known lengths, given runs, runs for IOHprofiler."""
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from decimal import Decimal
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import yaml
+from pydantic import Field
+
+import evoexp
+from evoexp.errors import SettingError, nearest, printable
+from evoexp.input_files import NUMBER, TableError, read_bounded, read_table
+from evoexp.report.results.planner_runs import PlannerRuns, Problem
+from evoexp.validation import NonNegativeCount, Positive, Settings, construct
+
+
+class BestKnown(Settings):
+    """The shortest proven answer known of a problem."""
+
+    problem: str  # its name, for readers
+    length: Positive  # of the joints' path [rad, m]
+    run: Annotated[str, Field(pattern="^[0-9a-f]{12}$")]  # hash of the run that found it
+    replicate: NonNegativeCount  # of that run
+
+
+def shipped_best_known() -> dict[str, BestKnown]:
+    """Return the shipped file's content by the keys of problems."""
+    return read_best_known(Path(evoexp.__file__).parent / "assets/best_known.yaml")
+
+
+def read_best_known(path: str | Path) -> dict[str, BestKnown]:
+    """Return a file's content by the keys of problems.
+
+    Raises:
+        SettingError: If something in it cannot be.
+        UnknownSetting: If an entry has another key.
+        OSError: If it cannot be read.
+    """
+    return parsed(read_bounded(path), Path(path).name)
+
+
+def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
+    """Return a file's content by the keys of problems."""
+    try:
+        entries = yaml.safe_load(content) or {}
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
+        raise SettingError(name, "YAML", str(error).splitlines()[0]) from None
+    if not isinstance(entries, dict):
+        raise SettingError(name, "a mapping of keys of problems", entries)
+    for key, entry in entries.items():
+        if not isinstance(key, str) or not re.fullmatch("[0-9a-f]{12}", key):
+            raise SettingError(name, "keys of 12 hex digits in quotation marks", key)
+        if not isinstance(entry, dict):
+            must = f"a mapping of {', '.join(BestKnown.model_fields)}"
+            raise SettingError(f"{name}, {key}", must, entry)
+    return {key: construct(BestKnown, entry, f"{name}, {key}") for key, entry in entries.items()}
+
+
+COLUMNS = ("planner", "problem", "seed", "queries", "cost")
+MARK = " (given)"  # behind the names of planners that were not run here
+UNANSWERED = ("", "inf", "+inf", "infinity")  # costs of runs without an answer
+MOST = 10**18  # seeds and queries stay below
+
+
+class GivenData(NamedTuple):
+    """A file's content."""
+
+    name: str  # of the file
+    sha256: str  # of its bytes, 64 hex digits
+    # Its rows in order, columns `COLUMNS`: queries are the configurations that the run had judged
+    # for collision so far, cost is the length of the path [rad, m]; NaN: no answer
+    answers: pd.DataFrame
+
+
+def read_given(path: str) -> GivenData:
+    """Read a file with the columns planner, problem, seed, queries and cost.
+
+    Raises:
+        SettingError: If something in it cannot be; names line and column.
+        OSError: If it cannot be read.
+    """
+    content = read_bounded(path)
+    name = printable(Path(path).name)
+    try:
+        table = read_table(content)
+    except TableError as error:
+        raise SettingError(f"{name}, line {error.line}", error.must, error.was) from None
+    columns = table[0].cells if table else []
+    for column in columns:
+        if column not in COLUMNS:
+            where, must = f"{name}, line {table[0].line}", f"the columns {', '.join(COLUMNS)}"
+            raise SettingError(where, must, column, nearest(column, COLUMNS))
+    for column in COLUMNS if table else ():
+        if (count := columns.count(column)) != 1:
+            where = f"{name}, line {table[0].line}, {column}"
+            raise SettingError(where, "there once", f"{count} times")
+    rows = [
+        _answer(f"{name}, line {line}", dict(zip(columns, cells, strict=True)))
+        for line, cells in table[1:]
+    ]
+    if not rows:
+        raise SettingError(name, "a file with a row per improvement of a run", "no row")
+    answers = pd.DataFrame(rows, columns=list(COLUMNS))
+    return GivenData(name, hashlib.sha256(content).hexdigest(), answers)
+
+
+def _answer(where: str, cells: dict[str, str]) -> tuple[str, str, int, int, float]:
+    """Return the checked cells of a row in the order of `COLUMNS`."""
+    for name in ("planner", "problem"):
+        if not cells[name] or not cells[name].isprintable():
+            raise SettingError(f"{where}, {name}", "a name", cells[name])
+    counts = {}
+    for name in ("seed", "queries"):  # whole numbers, which may be written as `1e3` or `12.0`
+        value = Decimal(cells[name]) if NUMBER.fullmatch(cells[name]) else Decimal(-1)
+        if not 0 <= value < MOST or value != value.to_integral_value():
+            must = "a whole number, at least 0, of 18 digits at most"
+            raise SettingError(f"{where}, {name}", must, cells[name])
+        counts[name] = int(value)
+    cost = math.nan
+    if cells["cost"].lower() not in UNANSWERED:
+        cost = float(cells["cost"]) if NUMBER.fullmatch(cells["cost"]) else math.nan
+        if not 0.0 < cost < math.inf:
+            must = "a length above 0, or empty or inf where the run has no answer"
+            raise SettingError(f"{where}, cost", must, cells["cost"])
+    return cells["planner"], cells["problem"], counts["seed"], counts["queries"], cost
+
+
+def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
+    """Return the runs of a file, beside ours; a run has spent the most queries of its rows.
+
+    A problem is one of ours if the file calls it as the page does, or by a label of one of its
+    conditions, or by its key; else it is a problem of its own, where any answer is the only target.
+    """
+    known = _known(ours)
+    problems = [known.get(called, Problem(called)) for called in data.answers["problem"]]
+    table = data.answers.assign(problem=[problem.name for problem in problems])
+    by_name: dict[Any, Problem] = {problem.name: problem for problem in problems}
+    named = len({*by_name, *(own.problem.name for own in ours)}) > 1
+    given = []
+    for (planner, name), rows in table.groupby(["planner", "problem"], sort=False):
+        spent = rows.groupby("seed")["queries"].max()  # by the seeds, in their order
+        answers = rows.dropna(subset="cost").sort_values(["seed", "queries"], kind="stable")
+        columns = {"seed": "replicate", "queries": "collision_queries", "cost": "length"}
+        proven = answers[list(columns)].rename(columns=columns).assign(certified=True)
+        marked = f"{planner}{MARK}"
+        own = PlannerRuns(
+            marked,
+            by_name[name],
+            f"{name}: {marked}" if named else marked,
+            proven.astype({"certified": bool}).reset_index(drop=True),
+            tuple(map(int, spent.index)),
+            spent.to_numpy(np.float64),
+            None,
+        )
+        given.append(own)
+    return given
+
+
+def strange_problems(data: GivenData, ours: Sequence[PlannerRuns]) -> Iterator[str]:
+    """Yield a line for each problem of a file that is none of ours, with the name perhaps meant."""
+    known = _known(ours)
+    for name in data.answers["problem"].unique():
+        if name not in known:
+            hint = nearest(name, known)
+            yield f"{data.name}: '{name}' is a problem of its own, none of those compared{hint}"
+
+
+def _known(ours: Sequence[PlannerRuns]) -> dict[str, Problem]:
+    """Return our problems by each name that a file may call them."""
+    known = {own.problem.name: own.problem for own in ours}
+    for own in ours:
+        known.setdefault(own.label, own.problem)
+        known.setdefault(own.problem.key, own.problem)
+    return known
+
+
+VERSION = "0.3.18"  # of IOHexperimenter, whose files these are like
+SUITE = "evoexp"
+INSTANCE = 1  # seeds are repetitions on one instance of a problem
+NO_ANSWER = 1e6  # [rad, m] longer than any path; ten times as much where a given one is not
+HEADER = ("evaluations", "raw_y")
+Rows = list[tuple[int, float]]
+
+
+def ioh_files(runs: Sequence[PlannerRuns]) -> dict[str, bytes]:
+    """Return the contents of all files by their paths in the folder, problems numbered from 1."""
+    problems = list(dict.fromkeys(own.problem.name for own in runs))
+    folders = _slugs(dict.fromkeys(own.planner for own in runs))
+    names, dimensions = _slugs(problems), {name: _dimension(runs, name) for name in problems}
+    # for no answer stands a power of ten above all lengths
+    longest = max((float(own.table["length"].max()) for own in runs if len(own.table)), default=1.0)
+    nothing = max(NO_ANSWER, 10.0 ** (math.floor(math.log10(longest)) + 1))
+    cells: dict[tuple[str, str], list[PlannerRuns]] = {}
+    for own in runs:
+        cells.setdefault((own.planner, own.problem.name), []).append(own)
+    files: dict[str, bytes] = {}
+    for (planner, problem), same in cells.items():
+        summaries, lines = list[dict[str, Any]](), list[str]()
+        for own in same:
+            for seed, spent in zip(own.replicates, own.spent, strict=True):
+                rows = run_rows(own, seed, float(spent), nothing + len(summaries))
+                evaluations, y = rows[-1]
+                best = {"evals": min(at for at, value in rows if value == y), "y": y, "x": []}
+                run = {"instance": INSTANCE, "evals": evaluations, "best": best, "seed": seed}
+                summaries.append(run)
+                lines += [" ".join(HEADER), *(f"{at} {value!r}" for at, value in rows)]
+        number, size = problems.index(problem) + 1, dimensions[problem]
+        data = f"data_f{number}_{names[problem]}/IOHprofiler_f{number}_DIM{size}.dat"
+        content = {
+            "version": VERSION,
+            "suite": SUITE,
+            "function_id": number,
+            "function_name": problem,
+            "maximization": False,
+            "algorithm": {"name": planner, "info": "evoexp"},
+            "run_attributes": ["seed"],
+            "attributes": list(HEADER),
+            "scenarios": [{"dimension": size, "path": data, "runs": summaries}],
+        }
+        text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        folder = folders[planner]
+        files[f"{folder}/IOHprofiler_f{number}_{names[problem]}.json"] = text.encode()
+        files[f"{folder}/{data}"] = "\n".join([*lines, ""]).encode()
+    return files
+
+
+def run_rows(own: PlannerRuns, replicate: int, spent: float, nothing: float) -> Rows:
+    """Return (evaluations, length of the shortest proven answer so far) of a run.
+
+    Readers tell runs apart by the first evaluation, so its row is always there, and is the only one
+    of that number.
+    """
+    table = own.table[(own.table["replicate"] == replicate) & own.table["certified"]]
+    rows, best = [(1, nothing)], nothing
+    for queries, length in sorted(zip(table["collision_queries"], table["length"], strict=True)):
+        if length >= best:
+            continue
+        best, at = float(length), max(int(queries), 1)
+        if rows[-1][0] == at:
+            rows.pop()
+        rows.append((at, best))
+    if spent > rows[-1][0]:
+        rows.append((int(spent), best))
+    return rows
+
+
+def _dimension(runs: Sequence[PlannerRuns], problem: str) -> int:
+    """Return the number of joints of a problem's motions; 0 where nobody here knows it."""
+    conditions = (own.condition for own in runs if own.problem.name == problem and own.condition)
+    motions = (
+        c.prepared.planner.motion(c.prepared.problem, solution)
+        for c in conditions
+        for solution in c.solutions.values()
+    )
+    return next((int(motion.q.shape[1]) for motion in motions if motion is not None), 0)
+
+
+def _slugs(names: Iterable[str]) -> dict[str, str]:
+    """Return a name for files of each name, all different, also where case does not count."""
+    slugs: dict[str, str] = {}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9.+-]+", "_", name.replace("*", "star")).strip("._") or "unnamed"
+        slug = plain
+        while slug.lower() in {taken.lower() for taken in slugs.values()}:
+            slug = f"{plain}_{len(slugs) + 1}"
+            plain = slug
+        slugs[name] = slug
+    return slugs

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from evoexp.playback.joint_limits import LimitsFileError, joint_limits
+from evoexp.playback.trajectory import LimitsFileError, joint_limits
 
 NAMES = ("shoulder", "elbow")
 DEFAULTS = np.array([1.0, 2.0]), np.array([np.inf, 3.0]), 0.5  # command line, robot, ramp

@@ -6,9 +6,8 @@ import pytest
 from evoexp.collision.scene import Part, Scene, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.planners.proofs import judge_motion
-from evoexp.playback.body_poses import MAX_TICKS, points, ticks
 from evoexp.playback.contacts import clearance, remainder
-from evoexp.playback.recording import Recording
+from evoexp.playback.recording import MAX_TICKS, Recording, points, ticks
 from evoexp.playback.shapes import outline
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
 from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted

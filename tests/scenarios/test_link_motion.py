@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from evoexp.errors import SettingError
-from evoexp.scenarios.link_motion import Posture
+from evoexp.scenarios.arm_motion import Posture
 
 
 def reached(x: float, y: float, elbow: Any, base: float = 0.0) -> np.ndarray:

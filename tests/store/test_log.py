@@ -15,8 +15,7 @@ from store_samples import CONDITION, CONFIG, ENVIRONMENT, SUMMARY, generations, 
 
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.records import Block, FrontRow, Generation, GenerationRow
-from evoexp.store.digests import Chain, array_bytes
-from evoexp.store.log import Finished, Log
+from evoexp.store.log import Chain, Finished, Log, array_bytes
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 from masked_logs import TIMES, masked_log
 

@@ -1,14 +1,23 @@
-"""Arms that shall move from one configuration to another among obstacles."""
+"""Arms that shall move from one configuration to another among obstacles.
 
-from typing import Annotated, ClassVar
+Planar robots of two links have absolute link angles, from +x. Their postures are given by these
+angles or, as in Curkovic et al. 2013, by the place of the end-effector; the setting `elbow` chooses
+between the two elbows that reach it.
+"""
+
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
+from evoexp.numeric.elementary import DEGREE, acos, atan2
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import SceneTask
-from evoexp.validation import NonNegative, Vector
+from evoexp.validation import NonNegative, Settings, Vector
+
+HALF_TURN = 180.0  # [deg] genes live in [0, π)
+ROUNDING = 2.0**-48  # [-] more than the relative errors of what `_reach` computes
 
 
 class ArmMotion(SceneTask):
@@ -32,3 +41,93 @@ class ArmMotion(SceneTask):
                 must = f"one list per arm of the robot, with {counts} joint angles"
                 raise SettingError(f"scenario.{name}", must, [list(arm) for arm in given])
         return np.concatenate(self.q_start), np.concatenate(self.q_goal)
+
+
+class Posture(Settings):
+    """A posture of one robot: link angles, or the end-effector's place with an elbow."""
+
+    # of the links, absolute, from +x [deg]
+    angles: Annotated[Vector, Field(min_length=2, max_length=2)] | None = None
+    tip: tuple[float, float] | None = None  # of the end-effector (x, y) [length unit of the scene]
+    # which of the two elbows that reach `tip`: the one to its left or to its right, seen from
+    # the base
+    elbow: Literal["left", "right"] | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.angles is None) == (self.tip is None):
+            was = None if self.angles is None else "both"
+            raise SettingError("angles", "given, or else tip with elbow", was)
+        if (self.tip is None) != (self.elbow is None):
+            raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
+        return self
+
+    def link_angles(self, field: str, base: FloatArray, lengths: FloatArray) -> FloatArray:
+        """Return the link angles (2,) [deg] of a robot at a base (2,), with link lengths (2,)."""
+        if self.angles is not None:
+            angles = np.array(self.angles)
+        else:
+            side = 1.0 if self.elbow == "left" else -1.0
+            angles = _reach(f"{field}.tip", np.array(self.tip) - base, lengths, side)
+        for k, angle in enumerate(angles):
+            must = "within [0, 180] deg, where the genes live"
+            demand(0.0 <= angle <= HALF_TURN, f"{field}.angles[{k}]", must, float(angle))
+        return angles
+
+
+class LinkMotion(SceneTask):
+    """Start and goal of every planar robot of two links, and the obstacles around them."""
+
+    component: ClassVar[str] = "link_motion"
+
+    # posture of every robot at the start
+    q_start: Annotated[tuple[Posture, ...], Field(min_length=2)]
+    q_goal: Annotated[tuple[Posture, ...], Field(min_length=2)]  # at the goal
+    # robots (counted from 0) that keep their start posture; their goal must be the same
+    stationary: tuple[int, ...] = ()
+
+    def ends(self, bases: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return link angles of all robots at start and goal, each (robots, 2) [deg].
+
+        The robots have bases and lengths of their links, (robots, 2) each.
+        """
+        ends = []
+        for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
+            must = f"one posture per robot ({len(bases)})"
+            demand(len(postures) == len(bases), f"scenario.{name}", must, len(postures))
+            fields = [f"scenario.{name}[{robot}]" for robot in range(len(bases))]
+            ends.append(np.array([*map(Posture.link_angles, postures, fields, bases, lengths)]))
+        start, goal = ends
+        for robot in self.stationary:
+            if not 0 <= robot < len(bases):
+                raise SettingError("scenario.stationary", f"robots 0 … {len(bases) - 1}", robot)
+            if not np.array_equal(start[robot], goal[robot]):
+                must = "the same as its start, since the robot is stationary"
+                raise SettingError(f"scenario.q_goal[{robot}]", must, list(goal[robot]))
+        return start, goal
+
+
+def _reach(field: str, tip: FloatArray, lengths: FloatArray, side: float) -> FloatArray:
+    """Return the link angles (2,) [deg] in [−180, 360) that bring the end-effector to a place.
+
+    The place (2,) is from the base; so seen, the elbow is on the left (side 1) or right (−1).
+    """
+    x, y = tip
+    squared = float(x * x + y * y)
+    first, second = (float(length) for length in lengths)
+    cosine = (squared - first * first - second * second) / (2.0 * first * second)
+    # a stretched or folded arm is one up to rounding, which an arccosine would blow up to 1e-8
+    rounding = ROUNDING * (squared + first * first + second * second) / (first * second)
+    if abs(abs(cosine) - 1.0) <= rounding:
+        cosine = 1.0 if cosine > 0.0 else -1.0
+    must = f"{abs(first - second):g} to {first + second:g} away from the robot's base"
+    demand(-1.0 <= cosine <= 1.0, field, must, f"{float(np.sqrt(squared)):g} away")
+    # of the second link against the first: an elbow on the left bends to the right
+    bend = -side * acos(cosine)
+    sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))
+    one = atan2(float(y), float(x)) - atan2(second * sine_bend, first + second * cosine)
+    angles = np.array([one, one + bend]) / DEGREE
+    # 0 and 180 deg bound the genes: rounding must not put an arm outside
+    for bound in (0.0, HALF_TURN):
+        angles[np.abs(angles - bound) <= ROUNDING * HALF_TURN] = bound
+    return angles

@@ -17,8 +17,7 @@ import pyarrow.parquet as pq
 from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import ReplicateSummary, flatten
 from evoexp.store.files import listed, reason, set_aside, warn, write_file
-from evoexp.store.log_bounds import check_sums
-from evoexp.store.log_reader import read_summary
+from evoexp.store.log_reader import check_sums, read_summary
 from evoexp.store.messages import field_types
 from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory

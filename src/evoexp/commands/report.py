@@ -10,7 +10,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from evoexp.commands import site
 from evoexp.commands.arguments import is_override, option_words
@@ -251,23 +251,16 @@ def _budgets(outputs: Path, name: str) -> Iterator[str]:
             ids = {condition.id for _, condition in experiment.conditions}
         runs = (RunDirectory(outputs, each) for each in ids)
         begun = [run for run in runs if run.completed() or run.failed()]
-        own = [run for run in begun if _notes(run).get("experiment") == name]
+        own = [run for run in begun if run.manifest().get("experiment") == name]
         if not own and len(begun) < max(len(ids), 1):
             continue
         # `quick` has the hashes of the paper's budget
-        commands = [str(_notes(run).get("command")) for run in own or begun]
+        commands = [str(run.manifest().get("command")) for run in own or begun]
         is_quick = budget == "paper" and all("budget=quick" in each.split() for each in commands)
         if is_quick:
             (quick,) = compose.expand([f"experiment={name}", "budget=quick"])
             is_quick = all(len(run.completed()) <= quick.num_replicates for run in own or begun)
         yield "quick" if is_quick else budget
-
-
-def _notes(run: RunDirectory) -> dict[str, Any]:
-    """Return the notes on a run's origin; none if they are damaged."""
-    with contextlib.suppress(EvoexpError):
-        return run.manifest()
-    return {}
 
 
 def _again(folder: str, command: str) -> build.ReportFiles:

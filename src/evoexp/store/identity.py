@@ -15,7 +15,6 @@ from evoexp.store.log_reader import LogContents, read_log
 
 CONFIG, MANIFEST, REPLICATES = "config.json", "manifest.json", "replicates"
 PLANS = "plans.json"  # how many replicates were asked for, and how many were stored by then
-RESTORED = "restored_from"  # the entry of a restored manifest that names a log
 TAKEN = "taken_from"  # the entry of a manifest out of an archive that names the archive
 _TEXTS = ("experiment", "label", "budget", "command", TAKEN)  # entries of a manifest
 _SECTIONS = ("versions", "platform", "cpu", "components", "git", "options")
@@ -144,10 +143,3 @@ def _misshapen(manifest: Mapping[str, Any]) -> Iterator[str]:
             yield "options are no names and origins"
         elif ".." in f"{group}{texts[0]}" or group.startswith("/") or str(texts[0])[:1] == "/":
             yield "options name files elsewhere"  # a report reads those that are shipped
-
-
-def restored_manifest(path: Path, condition_id: str) -> dict[str, Any]:
-    """Return the part of the manifest that a log knows, marked as restored; empty without a log."""
-    for name, log in whole_logs(path, condition_id):
-        return {"condition": condition_id, **log.environment, "git": None, RESTORED: name}
-    return {}

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from evoexp.errors import EvoexpError, StoreError
+from evoexp.errors import StoreError
 from evoexp.shipped import rows_of, shipped
 from evoexp.store.identity import CONFIG, MANIFEST, read_object
 from evoexp.store.manifest import leaves
@@ -46,11 +46,7 @@ def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
 
 def origin_of(run: RunDirectory) -> dict[str, Any]:
     """Return the `origin` of a stored run; of one whose manifest is lost by its hash alone."""
-    try:
-        notes = run.manifest()
-    except EvoexpError:
-        notes = {}
-    return origin(notes, run.condition_id)
+    return origin(run.manifest(), run.condition_id)
 
 
 def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[str, Any]:

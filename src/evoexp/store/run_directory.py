@@ -19,7 +19,6 @@ from evoexp.store.identity import (
     MANIFEST,
     PLANS,
     REPLICATES,
-    RESTORED,
     TAKEN,
     DamagedFile,
     Plan,
@@ -28,7 +27,6 @@ from evoexp.store.identity import (
     lost_files,
     read,
     read_object,
-    restored_manifest,
     stored_id,
     whole_logs,
 )
@@ -124,19 +122,12 @@ class RunDirectory:
         raise error
 
     def manifest(self) -> dict[str, Any]:
-        """Return the manifest that was written when the run was created.
-
-        Where it is lost, the environment of a log stands for it, which is said, or else StoreError
-        is raised.
-        """
+        """Return the manifest that was written when the run was created; a lost one is empty."""
         try:
             return checked_manifest(self.path, self.condition_id)
         except DamagedFile as error:
-            restored = restored_manifest(self.path, self.condition_id)
-            if not restored:
-                raise
-            warn(f"{error}; taken from {restored[RESTORED]}. Mend it: {COMMAND}")
-            return restored
+            warn(f"{error}. Mend it: {COMMAND}")
+            return {}
 
     def damaged_files(self, config_json: bytes | None = None) -> dict[str, str]:
         """Return name → what is wrong with it, of the files beside the logs, see `check`.

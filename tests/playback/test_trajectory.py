@@ -10,8 +10,17 @@ import scipy
 
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.playback.recording import Recording
-from evoexp.playback.timing import BadTiming, SpeedLimits, fastest
-from evoexp.playback.trajectory import JointLimits, Trajectory, as_csv, as_json, as_ros, trajectory
+from evoexp.playback.trajectory import (
+    BadTiming,
+    JointLimits,
+    SpeedLimits,
+    Trajectory,
+    as_csv,
+    as_json,
+    as_ros,
+    fastest,
+    trajectory,
+)
 from playback_samples import SAMPLES, recording
 
 PATH = np.array([[0.0, 0.0], [1.0, -0.5], [1.0, -0.5], [1.01, -0.5], [0.0, 2.0]])

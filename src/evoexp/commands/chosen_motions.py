@@ -17,7 +17,7 @@ from evoexp.configuration import compose
 from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
 from evoexp.paths.motion import Motion
 from evoexp.playback.recording import Heading, Recording, joints_of, record, record_motion
-from evoexp.playback.timing import SpeedLimits
+from evoexp.playback.trajectory import SpeedLimits
 from evoexp.playback.trajectory_files import JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot

@@ -13,7 +13,7 @@ from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
 from evoexp.playback.contacts import Clearance, clearance, part_at
 from evoexp.playback.shapes import Role, Shape, outline, pose
-from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
+from evoexp.playback.trajectory import SpeedLimits, seconds_per_instant, velocities
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 

@@ -20,7 +20,7 @@ from evoexp.input_files import NUMBER, TableError, read_table
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.playback.recording import Joint
-from evoexp.playback.timing import hermite_motion
+from evoexp.playback.trajectory import hermite_motion
 from evoexp.records import FloatArray
 
 TURNS = {"rad": 1.0, "radian": 1.0, "radians": 1.0}

@@ -12,7 +12,7 @@ from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
 from evoexp.store.run_context import ORIGIN, origin_of, run_context
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
-from evoexp.store.tables import read_generations, read_summaries
+from evoexp.store.summaries import read_generations, read_summaries
 
 SEED = "seed"
 

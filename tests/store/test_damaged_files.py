@@ -220,9 +220,7 @@ def test_a_lost_manifest_is_named_with_the_command_that_renews_it(
     run: RunDirectory, content: str, why: str
 ) -> None:
     (run.path / "manifest.json").write_text(content)
-    with pytest.warns(
-        DamagedStore, match=rf"manifest\.json: {why}.*Mend it: evoexp run"
-    ):
+    with pytest.warns(DamagedStore, match=rf"manifest\.json: {why}.*Mend it: evoexp run"):
         assert run.manifest() == {}
 
 

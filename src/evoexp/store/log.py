@@ -18,13 +18,8 @@ from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
-from evoexp.store.messages import (
-    encode,
-    encode_generation,
-    encode_summary,
-    encode_values,
-    json_schema,
-)
+from evoexp.store import messages
+from evoexp.store.messages import encode_values, json_schema
 
 LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
 # of everything a log holds; raised when a reader of the old version would misunderstand
@@ -143,7 +138,7 @@ class Log:
                 terms=best.terms,
                 chain=link,
             )
-            data, is_first = encode_generation(row), not self._channels
+            data, is_first = messages.encode_generation(row), not self._channels
             self._add(GENERATION_TOPIC, GenerationRow, row.index, data, tuple(row.terms))
             if is_first or self._best_cost < self._written_cost:
                 self._write_solution(row.index)
@@ -156,7 +151,7 @@ class Log:
                 # a matrix travels flat, beside the number of its columns
                 flat = np.ascontiguousarray(criteria.T, dtype=np.float64).reshape(-1)
                 front = {"generation": self._last, "population": population}
-                data = encode(front | {"criteria": flat, "num_criteria": len(criteria)})
+                data = messages.encode(front | {"criteria": flat, "num_criteria": len(criteria)})
                 self._add(FRONT_TOPIC, FrontRow, self._last, data)
 
     def finish(self, summary: ReplicateSummary) -> Finished:
@@ -166,14 +161,14 @@ class Log:
         summary = summary._replace(digest=self._chain.finish(self._population))
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
-        self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
+        self._writer.add_metadata(SUMMARY, messages.encode_summary(summary) | content)
         self._writer.finish()
         return Finished(self._buffer.getvalue(), summary)
 
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost
         row = SolutionRow(int(index), float(self._best_cost), np.frombuffer(self._best))
-        self._add(SOLUTION_TOPIC, SolutionRow, index, encode(row._asdict()))
+        self._add(SOLUTION_TOPIC, SolutionRow, index, messages.encode(row._asdict()))
 
     def _attach(self, name: str, data: bytes) -> None:
         kind = "application/json" if name.endswith(".json") else "application/octet-stream"

@@ -31,16 +31,9 @@ from evoexp.errors import CorruptLog, EvoexpError, OtherVersion
 from evoexp.input_files import MEGABYTE, read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
+from evoexp.store import messages
 from evoexp.store.log import MAX_LOG, message_bytes
-from evoexp.store.messages import (
-    NONFINITE,
-    TERM,
-    decode,
-    decode_environment,
-    decode_values,
-    field_types,
-    restore,
-)
+from evoexp.store.messages import TERM, decode_values
 
 # One solution or front: 300,000 numbers. The largest of a shipped experiment takes 60 kB.
 MAX_MESSAGE = 8 * MEGABYTE
@@ -244,7 +237,7 @@ def _opened(source: Source) -> Iterator[CheckedLog]:
 def _summary(log: CheckedLog, place: Place | None) -> ReplicateSummary:
     """Return the summary of a log, which must be of its own run, and of a place."""
     values, run = decode_values(log.metadata(written.SUMMARY)), log.records[written.RUN]
-    summary = decode(ReplicateSummary, values)
+    summary = messages.decode(ReplicateSummary, values)
     own = (summary.condition, summary.replicate)
     if own != (run["condition"], int(run["replicate"])):
         raise CorruptLog(f"{log.name}: altered: its summary is of another replicate")
@@ -268,7 +261,7 @@ def read_log(source: Source, place: Place | None = None) -> LogContents:
             whole = message_bytes(identity, message.log_time, message.sequence, message.data)
             digest.update(whole)
             if channel.topic in rows:
-                row = decode(_RECORDS[channel.topic], orjson.loads(message.data))
+                row = messages.decode(_RECORDS[channel.topic], orjson.loads(message.data))
                 rows[channel.topic].append(row)
             if channel.topic == written.GENERATION_TOPIC:
                 cpu_ns.append(message.publish_time)
@@ -287,7 +280,7 @@ def read_log(source: Source, place: Place | None = None) -> LogContents:
             solutions=rows[written.SOLUTION_TOPIC],
             fronts=rows[written.FRONT_TOPIC],
             summary=summary,
-            environment=decode_environment(log.metadata(written.ENVIRONMENT)),
+            environment=messages.decode_environment(log.metadata(written.ENVIRONMENT)),
             attachments=log.attachments,
             content_digest=content_digest,
             cpu_s=1e-9 * np.array(cpu_ns, np.float64) if is_timed else np.full(len(cpu_ns), np.nan),
@@ -304,7 +297,7 @@ def read_solution(source: Source) -> SolutionRow:
     """Return a log's last solution, the best of the replicate; only its chunk is decompressed."""
     with _opened(source) as log:
         for _, _, message in log.reader.iter_messages(written.SOLUTION_TOPIC, reverse=True):
-            return decode(SolutionRow, orjson.loads(message.data))
+            return messages.decode(SolutionRow, orjson.loads(message.data))
         raise ValueError("no solution")
 
 
@@ -314,16 +307,16 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     A term that a generation does not have is NaN there. The content digest is not compared.
     """
     with _opened(source) as log:
-        messages = log.reader.iter_messages(written.GENERATION_TOPIC, log_time_order=False)
-        rows = [orjson.loads(message.data) for _, _, message in messages]
+        generations = log.reader.iter_messages(written.GENERATION_TOPIC, log_time_order=False)
+        rows = [orjson.loads(message.data) for _, _, message in generations]
         names = dict.fromkeys(name for row in rows for name in row if name.startswith(TERM))
         # rows that each have terms of their own: their table would be larger than any log
         if len(names) * len(rows) * 8 > MAX_LOG:
             raise ValueError(f"{len(rows)} generations with {len(names)} different terms")
         for row in rows:
-            if NONFINITE in row:
-                restore(row)
-        fields = field_types(GenerationRow).items()
+            if messages.NONFINITE in row:
+                messages.restore(row)
+        fields = messages.field_types(GenerationRow).items()
         columns = {
             name: np.array([row[name] for row in rows], dtype=DTYPES[kind])
             for name, kind in fields

@@ -21,7 +21,7 @@ from evoexp.errors import CorruptLog
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.records import Block, FrontRow, Generation, GenerationRow
 from evoexp.store import log as log_module
-from evoexp.store.log import Chain, Finished, Log, array_bytes
+from evoexp.store.log import Finished, Log, array_bytes
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 from forged_logs import with_metadata
 from masked_logs import TIMES, masked_log
@@ -146,17 +146,19 @@ def test_other_readers_of_mcap_find_their_way() -> None:
 
 
 def test_the_chain_is_the_documented_hash_and_refuses_other_generators() -> None:
-    bits = np.random.PCG64(3)
-    rng = np.random.Generator(bits)
-    costs, best, population = rng.random(5), rng.random(4), rng.random((5, 4))
-    chain, before, content = Chain(rng), b"", costs.tobytes() + best.tobytes()
-    for _ in range(2):
-        before = xxhash.xxh3_128(before + content + state_bytes(bits)).digest()
-        assert chain.extend(array_bytes(costs), array_bytes(best), chain.state()) == before.hex()
+    rng, link, links = np.random.default_rng(3), b"", []
+    log = Log(CONDITION, CONFIG, 7, rng)
+    for each in generations(4):
+        log.write(Block.of(each))
+        content = each.costs.tobytes() + each.best.tobytes() + state_bytes(rng.bit_generator)
+        link = xxhash.xxh3_128(link + content).digest()
+        links.append(link.hex())
         rng.random()
-    assert chain.finish(population) == xxhash.xxh3_128_hexdigest(before + population.tobytes())
+    read = read_log(log.finish(SUMMARY).content)
+    assert [row.chain for row in read.generations] == links
+    assert read.summary.digest == xxhash.xxh3_128_hexdigest(link + each.population.tobytes())
     with pytest.raises(TypeError, match="PCG64.*MT19937"):
-        Chain(np.random.Generator(np.random.MT19937(0)))
+        Log(CONDITION, CONFIG, 7, np.random.Generator(np.random.MT19937(0)))
 
 
 def test_bytes_of_arrays_are_those_of_their_numbers() -> None:

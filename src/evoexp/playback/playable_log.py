@@ -42,22 +42,16 @@ OPACITY = {"arm": 1.0, "object": 0.9, "obstacle": 0.45, "start": 0.2, "end": 0.3
 Fields = dict[str, Any]
 """Fields of a protobuf message, by their names."""
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
-NUMBERS = {"type": "array", "items": NUMBER}
-CLEARANCE = {
-    "title": "evoexp.Clearance",
-    "type": "object",
-    "properties": dict.fromkeys(("instant", "clearance", "required", "contact"), NUMBER)
-    | {"pair": TEXT},
+CLEARANCE = dict.fromkeys(("instant", "clearance", "required", "contact"), NUMBER) | {"pair": TEXT}
+IMPROVEMENTS = {key: {"type": "array", "items": NUMBER} for key in ("generation", "best_cost")}
+SCHEMAS: dict[str, dict[str, Any]] = {  # topic → schema of our own
+    "/clearance": {"title": "evoexp.Clearance", "type": "object", "properties": CLEARANCE},
+    "/improvements": {"title": "evoexp.Improvements", "type": "object", "properties": IMPROVEMENTS},
 }
 ANSWERS = {
     True: "certified: no two bodies ever touch",
     False: "refuted: bodies touch",
     None: "undecided",
-}
-IMPROVEMENTS = {
-    "title": "evoexp.Improvements",
-    "type": "object",
-    "properties": {"generation": NUMBERS, "best_cost": NUMBERS},
 }
 
 
@@ -88,7 +82,7 @@ def playable_log(recording: Recording) -> bytes:
     rows = [row for row in recording.heading.improvements if np.isfinite(row[1])]
     if rows:
         columns = dict(zip(("generation", "best_cost"), zip(*rows, strict=True), strict=True))
-        out.json("/improvements", IMPROVEMENTS, 0, columns)
+        out.message("/improvements", 0, columns)
     for moment, message in _log_messages(recording):
         out.message("/log", moment, message)
     for k, instant in enumerate(recording.times.tolist()):
@@ -109,7 +103,7 @@ def playable_log(recording: Recording) -> bytes:
             "pair": clearance.pairs[k],
         }
         values |= {"clearance": least} if np.isfinite(least) else {}
-        out.json("/clearance", CLEARANCE, now, values)
+        out.message("/clearance", now, values)
     out.writer.finish()
     return out.buffer.getvalue()
 
@@ -136,24 +130,21 @@ class _Playable:
         self._counts = Counter[int]()  # messages of each channel
 
     def message(self, topic: str, moment: int, message: Any) -> None:
-        """Append a message of a protobuf schema."""
-        kind = type(message)
+        """Append a message of a protobuf schema, or values of our own schema for the topic."""
+        kind, own = type(message), SCHEMAS.get(topic)
         if topic not in self._channels:
-            if kind not in self._schemas:
-                self._schemas[kind] = register_schema(self.writer, kind)
-            channel = self.writer.register_channel(topic, "protobuf", self._schemas[kind])
-            self._channels[topic] = channel
-        self._add(topic, moment, message.SerializeToString(deterministic=True))
-
-    def json(self, topic: str, schema: dict[str, Any], moment: int, values: dict[str, Any]) -> None:
-        """Append a message of one of our own schemas, which one topic has alone."""
-        if topic not in self._channels:
-            data = json.dumps(schema, separators=(",", ":")).encode()
-            number = self.writer.register_schema(schema["title"], "jsonschema", data)
-            self._channels[topic] = self.writer.register_channel(topic, "json", number)
-        self._add(topic, moment, json.dumps(values, allow_nan=False).encode())
-
-    def _add(self, topic: str, moment: int, data: bytes) -> None:
+            if own:
+                schema = json.dumps(own, separators=(",", ":")).encode()
+                number = self.writer.register_schema(own["title"], "jsonschema", schema)
+            else:
+                number = self._schemas.get(kind) or register_schema(self.writer, kind)
+                self._schemas[kind] = number
+            form = "json" if own else "protobuf"
+            self._channels[topic] = self.writer.register_channel(topic, form, number)
+        if own:
+            data = json.dumps(message, allow_nan=False).encode()
+        else:
+            data = message.SerializeToString(deterministic=True)
         channel = self._channels[topic]
         self.writer.add_message(channel, moment, data, moment, self._counts[channel])
         self._counts[channel] += 1

@@ -63,7 +63,9 @@ def array_file(array: NDArray[Any]) -> bytes:
 class Log:
     """The log of one replicate: written block by block, finished into bytes.
 
-    Times and the environment enter neither messages nor chain nor digests.
+    Every generation extends a chain: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state of the
+    generator), the first before it being empty; the replicate's digest is that of the last link and
+    the population. Times and the environment enter neither messages nor chain nor digests.
     """
 
     def __init__(
@@ -79,11 +81,13 @@ class Log:
 
         Args:
             rng: The replicate's generator, whose state enters the chain; never drawn from here.
+                TypeError is raised where it is no PCG64.
             attachments: Further files that the condition needs, by name.
             environment: Versions, CPU features and what else may explain a difference.
         """
         self._environment = dict(environment or {})
-        self._chain = Chain(rng)
+        self._bits, self._link = rng.bit_generator, b""  # the last link of the chain
+        state_bytes(self._bits)  # raises where it is another generator
         self._content = xxhash.xxh3_128()
         self._channels: dict[str, tuple[int, str]] = {}  # id and name of schema, by topic
         self._num_messages = Counter[str]()  # by topic
@@ -117,14 +121,16 @@ class Log:
         The CPU time of the replicate until then [s] is the publish time of the messages.
         """
         self._cpu_ns = int(cpu_s * 1e9)
-        state = self._chain.state() if block.states is None else b""
+        state = state_bytes(self._bits) if block.states is None else b""
         solution: Best | None = None
         for k, best in enumerate(block.best_of_each):
             if best is not solution:
                 solution, self._best_cost = best, best.cost
                 self._best = array_bytes(np.asarray(best.solution, np.float64))
             costs = array_bytes(block.costs[k])
-            link = self._chain.extend(costs, self._best, block.states[k] if block.states else state)
+            own_state = block.states[k] if block.states else state
+            parts = self._link, costs, self._best, own_state
+            self._link = xxhash.xxh3_128_digest(b"".join(parts))
             row = GenerationRow(
                 index=block.first + k,
                 best_cost=best.cost,
@@ -136,7 +142,7 @@ class Log:
                 collision_queries=block.collision_queries[k],
                 solved=best.solved,
                 terms=best.terms,
-                chain=link,
+                chain=self._link.hex(),
             )
             data, is_first = messages.encode_generation(row), not self._channels
             self._add(GENERATION_TOPIC, GenerationRow, row.index, data, tuple(row.terms))
@@ -158,7 +164,8 @@ class Log:
         """Close the log; return its bytes and the summary, which gets its digest."""
         if self._best != self._written or self._best_cost != self._written_cost:
             self._write_solution(self._last)
-        summary = summary._replace(digest=self._chain.finish(self._population))
+        digest = xxhash.xxh3_128_hexdigest(self._link + array_bytes(self._population))
+        summary = summary._replace(digest=digest)
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
         self._writer.add_metadata(SUMMARY, messages.encode_summary(summary) | content)
@@ -193,30 +200,6 @@ class Log:
         log_time = int(generation) * _TICK
         self._writer.add_message(channel, log_time, data, self._cpu_ns, sequence)
         self._content.update(message_bytes((topic, name, "json"), log_time, sequence, data))
-
-
-class Chain:
-    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state)."""
-
-    def __init__(self, rng: "np.random.Generator") -> None:
-        """Start a chain, its link being empty; TypeError: the generator is no PCG64."""
-        self._rng, self.link = rng, b""
-        self.state()
-
-    def state(self) -> bytes:
-        """Return the state of the generator now."""
-        return state_bytes(self._rng.bit_generator)
-
-    def extend(self, costs: bytes, best: bytes, state: bytes) -> str:
-        """Append a generation, costs and best by `array_bytes`; return its link in hex."""
-        self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
-        return self.link.hex()
-
-    def finish(self, population: NDArray[Any]) -> str:
-        """Return the replicate's digest, xxh3_128(last link ‖ population), as 32 hex digits."""
-        digest = xxhash.xxh3_128(self.link)
-        digest.update(array_bytes(population))
-        return digest.hexdigest()
 
 
 def array_bytes(array: NDArray[Any]) -> bytes:

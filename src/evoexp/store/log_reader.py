@@ -84,24 +84,6 @@ def unreadable_is_corrupt(name: str) -> Iterator[None]:
         ) from error
 
 
-def check(content: bytes, name: str) -> CheckedLog:
-    """Check the bytes of a log: magic, checksums, the sizes of its records, its index."""
-    summary_start = check_sums(content, name)
-    with unreadable_is_corrupt(name):
-        if len(content) - summary_start > MAX_SUMMARY:
-            raise ValueError(f"a summary section of more than {MAX_SUMMARY} bytes")
-        log = CheckedLog(name, SeekingReader(BytesIO(content), validate_crcs=True), {}, {})
-        summary: Any = log.reader.get_summary()
-        told = [
-            [each.chunk_start_offset for each in summary.chunk_indexes],
-            [each.offset for each in summary.metadata_indexes],
-            [each.offset for each in summary.attachment_indexes],
-        ]
-        if told != _places(content, summary_start - _DATA_END.size, log):
-            raise CorruptLog(f"{name}: altered: its index does not tell the records that it holds")
-        return log
-
-
 def check_sums(content: bytes, name: str) -> int:
     """Check magic, footer and both checksums; return where the summary section starts [B]."""
     if not content:
@@ -219,8 +201,20 @@ def _opened(source: Source) -> Iterator[CheckedLog]:
         if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
             raise
         raise CorruptLog(f"{name}: cannot be read: {error.strerror or error}") from error
-    log = check(content, name)
+    summary_start = check_sums(content, name)
     with unreadable_is_corrupt(name):
+        # the sizes of its records, and its index
+        if len(content) - summary_start > MAX_SUMMARY:
+            raise ValueError(f"a summary section of more than {MAX_SUMMARY} bytes")
+        log = CheckedLog(name, SeekingReader(BytesIO(content), validate_crcs=True), {}, {})
+        summary: Any = log.reader.get_summary()
+        told = [
+            [each.chunk_start_offset for each in summary.chunk_indexes],
+            [each.offset for each in summary.metadata_indexes],
+            [each.offset for each in summary.attachment_indexes],
+        ]
+        if told != _places(content, summary_start - _DATA_END.size, log):
+            raise CorruptLog(f"{name}: altered: its index does not tell the records that it holds")
         if written.RUN not in log.records:
             must = f"an MCAP without metadata record '{written.RUN}'"
             raise CorruptLog(f"{name}: not a log of evoexp: {must}")

@@ -18,8 +18,8 @@ from evoexp.attachments import File, keep
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError
 from evoexp.scenarios import obstacles
-from evoexp.scenarios.arm_motion import Posture
 from evoexp.scenarios.grid_motion import GridMotion, blocks, read_map
+from evoexp.scenarios.motion_tasks import Posture
 from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table, rotation_matrix
 from obstacle_samples import box, capsule, cylinder, ellipse, half_space, sphere
 

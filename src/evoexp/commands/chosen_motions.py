@@ -23,7 +23,6 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table
 
@@ -112,7 +111,7 @@ def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) 
     """Return the motion of a log's best solution; the log alone is enough."""
     contents, title = read_log(log), log.name
     if run is not None:
-        origin = origin_of(run)
+        origin = run.origin()
         names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
         title = " · ".join(dict.fromkeys(names)) or run.hash12
     try:

@@ -24,8 +24,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
 from evoexp.playback.colours import OBJECT, OBSTACLE, arm_colour
-from evoexp.playback.recording import Recording
-from evoexp.playback.shapes import Outline, Shape
+from evoexp.playback.recording import Outline, Recording, Shape
 from evoexp.records import FloatArray
 
 LIBRARY = "evoexp"

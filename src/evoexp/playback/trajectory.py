@@ -207,7 +207,6 @@ def joint_limits(
 
 
 def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
-    """Read the limits that a file sets, per joint and kind."""
     was = printable(str(path))
     must, data = "map joints under 'joint_limits', as MoveIt's file", None
     try:

@@ -217,7 +217,6 @@ def _meaning(rest: str, units: set[str]) -> tuple[str, bool] | None:
 
 
 def _scaled(values: Values, joint: Joint, length_unit: str) -> FloatArray:
-    """Return values in rad, or in the scene's unit of length."""
     unit, numbers = values.unit, values.numbers
     known = {**TURNS, "": 1.0}
     if joint.prismatic:

@@ -198,7 +198,6 @@ def read_request(request: MessagePart) -> Request:
 
 
 def _goal(request: MessagePart) -> MessagePart:
-    """Return the only goal."""
     goals = list(request["goal_constraints"])
     must = "a request with one goal (goal_constraints)"
     request.require(len(goals) == 1, must, len(goals))

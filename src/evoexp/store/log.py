@@ -184,7 +184,6 @@ class Log:
     def _add(
         self, topic: str, record: type, generation: int, data: bytes, terms: tuple[str, ...] = ()
     ) -> None:
-        """Append a message."""
         self._size += len(data)
         if self._size > MAX_LOG:
             raise LogTooLarge(

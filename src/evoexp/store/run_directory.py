@@ -115,6 +115,10 @@ class RunDirectory:
             warn(f"{error}. Mend it: {COMMAND}")
             return {}
 
+    def origin(self) -> dict[str, Any]:
+        """Return the origin of the run, see `identity.origin`; by its hash alone if need be."""
+        return identity.origin(self.manifest(), self.condition_id)
+
     def damaged_files(self, config_json: bytes | None = None) -> dict[str, str]:
         """Return name → what is wrong with it, of the files beside the logs, see `check`.
 

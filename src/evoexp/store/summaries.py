@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import GenerationRow, ReplicateSummary, flatten
 from evoexp.store.files import listed, reason, set_aside, warn, write_file
+from evoexp.store.identity import ORIGIN, run_context
 from evoexp.store.log_reader import DTYPES, check_sums, generation_columns, read_summary
 from evoexp.store.messages import field_types
-from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory
 
 if TYPE_CHECKING:
@@ -221,7 +221,6 @@ def _up_to_date(
 
 
 def _is_intact(log: Path) -> bool:
-    """Return whether the checksums of a log are right."""
     try:
         check_sums(log.read_bytes(), log.name)
     except (CorruptLog, OSError):

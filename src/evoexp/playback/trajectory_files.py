@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import yaml
 
 from evoexp.errors import printable
 from evoexp.input_files import NUMBER, TableError, read_table
@@ -242,8 +243,6 @@ def parse_message(text: str, is_yaml: bool) -> Any:
     """Return the content of a JSON or YAML file of one document, or raise ValueError."""
     if not is_yaml:
         return json.loads(text)
-    import yaml  # takes long to load
-
     try:
         documents = [each for each in yaml.safe_load_all(text) if each is not None]
     except yaml.YAMLError as error:

@@ -1,15 +1,21 @@
-"""One replicate as one self-contained MCAP, written in memory, and its digests.
+"""One replicate as one self-contained MCAP, written in memory, its records as JSON.
 
-A chain of digests tells from which generation on two runs differ.
+A chain of digests tells from which generation on two runs differ. Records are flat, with a fixed
+order of keys. A non-finite number, for which JSON has no word, is written as null and named in
+`nonfinite`, a key that is there only when needed: `{"best_cost": "inf"}` for a field,
+`{"values": {"3": "nan"}}` for an element of an array.
 """
 
 import io
 import struct
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from functools import cache
+from math import isfinite
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
+import orjson
 import xxhash
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
@@ -17,9 +23,16 @@ from numpy.typing import NDArray
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.numeric.generator_state import state_bytes
-from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
-from evoexp.store import messages
-from evoexp.store.messages import encode_values, json_schema
+from evoexp.records import (
+    Best,
+    Block,
+    FloatArray,
+    FrontRow,
+    GenerationRow,
+    ReplicateSummary,
+    SolutionRow,
+    flatten,
+)
 
 LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
 # of everything a log holds; raised when a reader of the old version would misunderstand
@@ -38,8 +51,9 @@ GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/fr
 MAX_LOG = 128 * MEGABYTE
 _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
-
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
+TERM = "term_"
+NONFINITE = "nonfinite"
 
 
 class LogTooLarge(EvoexpError):
@@ -144,7 +158,7 @@ class Log:
                 terms=best.terms,
                 chain=self._link.hex(),
             )
-            data, is_first = messages.encode_generation(row), not self._channels
+            data, is_first = encode_generation(row), not self._channels
             self._add(GENERATION_TOPIC, GenerationRow, row.index, data, tuple(row.terms))
             if is_first or self._best_cost < self._written_cost:
                 self._write_solution(row.index)
@@ -157,7 +171,7 @@ class Log:
                 # a matrix travels flat, beside the number of its columns
                 flat = np.ascontiguousarray(criteria.T, dtype=np.float64).reshape(-1)
                 front = {"generation": self._last, "population": population}
-                data = messages.encode(front | {"criteria": flat, "num_criteria": len(criteria)})
+                data = encode(front | {"criteria": flat, "num_criteria": len(criteria)})
                 self._add(FRONT_TOPIC, FrontRow, self._last, data)
 
     def finish(self, summary: ReplicateSummary) -> Finished:
@@ -168,14 +182,14 @@ class Log:
         summary = summary._replace(digest=digest)
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
-        self._writer.add_metadata(SUMMARY, messages.encode_summary(summary) | content)
+        self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
         self._writer.finish()
         return Finished(self._buffer.getvalue(), summary)
 
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost
         row = SolutionRow(int(index), float(self._best_cost), np.frombuffer(self._best))
-        self._add(SOLUTION_TOPIC, SolutionRow, index, messages.encode(row._asdict()))
+        self._add(SOLUTION_TOPIC, SolutionRow, index, encode(row._asdict()))
 
     def _attach(self, name: str, data: bytes) -> None:
         kind = "application/json" if name.endswith(".json") else "application/octet-stream"
@@ -224,3 +238,73 @@ def message_bytes(
     """
     head = "\0".join((*channel, "")).encode()
     return head + _MESSAGE.pack(log_time, sequence, len(data)) + data
+
+
+_JSON_TYPES: dict[Any, dict[str, Any]] = {
+    int: {"type": "integer"},
+    float: {"type": "number"},
+    bool: {"type": "boolean"},
+    str: {"type": "string"},
+    FloatArray: {"type": "array", "items": {"type": "number"}},
+}
+
+
+@cache
+def field_types(record: type) -> dict[str, Any]:
+    """Return a record's fields and their types in order; `terms` become a field each."""
+    return {name: kind for name, kind in get_type_hints(record).items() if name != "terms"}
+
+
+@cache
+def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
+    """Return the JSON Schema of a record's messages, one type per field, as Foxglove reads it.
+
+    Any number may be null, which JSON Schema could only say with a union type.
+    """
+    properties = {name: _JSON_TYPES[kind] for name, kind in field_types(record).items()}
+    if record is FrontRow:  # a matrix travels flat
+        properties["num_criteria"] = _JSON_TYPES[int]
+    properties.update({TERM + name: _JSON_TYPES[float] for name in sorted(terms)})
+    title = f"evoexp.{record.__name__.removesuffix('Row')}"
+    return orjson.dumps({"title": title, "type": "object", "properties": properties})
+
+
+def encode_generation(row: GenerationRow) -> bytes:
+    """Return the message of one generation; its terms stand in alphabetical order."""
+    values = {name: kind(getattr(row, name)) for name, kind in field_types(GenerationRow).items()}
+    chain = values.pop("chain")
+    terms = {TERM + name: float(row.terms[name]) for name in sorted(row.terms)}
+    return encode({**values, **terms, "chain": chain})
+
+
+def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
+    """Return the summary as metadata: every value one JSON text, terms in alphabetical order."""
+    row = flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
+    return encode_values(flagged(row))
+
+
+def encode_values(values: Mapping[str, Any]) -> dict[str, str]:
+    """Return a mapping as metadata: every value one JSON text."""
+    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_SORT_KEYS
+    return {name: orjson.dumps(value, option=options).decode() for name, value in values.items()}
+
+
+def encode(row: dict[str, Any]) -> bytes:
+    """Return a message; numbers are Python's, arrays flat."""
+    text = orjson.dumps(row, option=orjson.OPT_SERIALIZE_NUMPY)
+    if b"null" in text:  # a number is not finite
+        return orjson.dumps(flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
+    return text
+
+
+def flagged(row: dict[str, Any]) -> dict[str, Any]:
+    """Return the row with `nonfinite` appended where a number of it needs the flag."""
+    flags: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, np.ndarray):
+            places = np.flatnonzero(~np.isfinite(value))
+            if places.size:
+                flags[name] = {str(place): repr(float(value[place])) for place in places.tolist()}
+        elif isinstance(value, float) and not isfinite(value):
+            flags[name] = repr(float(value))
+    return {**row, NONFINITE: flags} if flags else row

@@ -9,12 +9,13 @@ the content digest.
 import errno
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from sys import intern
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import orjson
@@ -31,9 +32,7 @@ from evoexp.errors import CorruptLog, EvoexpError, OtherVersion
 from evoexp.input_files import MEGABYTE, read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store import messages
-from evoexp.store.log import MAX_LOG, message_bytes
-from evoexp.store.messages import TERM, decode_values
+from evoexp.store.log import MAX_LOG, NONFINITE, TERM, field_types, message_bytes
 
 # One solution or front: 300,000 numbers. The largest of a shipped experiment takes 60 kB.
 MAX_MESSAGE = 8 * MEGABYTE
@@ -48,6 +47,12 @@ _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
 _TAIL = _FOOTER.size + len(MAGIC)
 Source = str | PathLike[str] | bytes
 Place = tuple[str, int]  # condition and replicate
+Row = TypeVar("Row", GenerationRow, SolutionRow, FrontRow, ReplicateSummary)
+_NUMBER = (int, float)
+# what JSON may hold for a field of each type; true and false are ints to Python only
+_TAKEN: dict[Any, Any] = {int: _NUMBER, float: _NUMBER, bool: bool, str: str, FloatArray: list}
+_TAKEN |= {kind | None: (*_NUMBER, type(None)) for kind in _NUMBER} | {bool | None: bool | None}
+_TRUTHS = (bool, bool | None)
 DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}
 _RECORDS: dict[str, type[Any]] = {
     written.GENERATION_TOPIC: GenerationRow,
@@ -231,7 +236,7 @@ def _opened(source: Source) -> Iterator[CheckedLog]:
 def _summary(log: CheckedLog, place: Place | None) -> ReplicateSummary:
     """Return the summary of a log, which must be of its own run, and of a place."""
     values, run = decode_values(log.metadata(written.SUMMARY)), log.records[written.RUN]
-    summary = messages.decode(ReplicateSummary, values)
+    summary = decode(ReplicateSummary, values)
     own = (summary.condition, summary.replicate)
     if own != (run["condition"], int(run["replicate"])):
         raise CorruptLog(f"{log.name}: altered: its summary is of another replicate")
@@ -255,7 +260,7 @@ def read_log(source: Source, place: Place | None = None) -> LogContents:
             whole = message_bytes(identity, message.log_time, message.sequence, message.data)
             digest.update(whole)
             if channel.topic in rows:
-                row = messages.decode(_RECORDS[channel.topic], orjson.loads(message.data))
+                row = decode(_RECORDS[channel.topic], orjson.loads(message.data))
                 rows[channel.topic].append(row)
             if channel.topic == written.GENERATION_TOPIC:
                 cpu_ns.append(message.publish_time)
@@ -274,7 +279,7 @@ def read_log(source: Source, place: Place | None = None) -> LogContents:
             solutions=rows[written.SOLUTION_TOPIC],
             fronts=rows[written.FRONT_TOPIC],
             summary=summary,
-            environment=messages.decode_environment(log.metadata(written.ENVIRONMENT)),
+            environment=decode_environment(log.metadata(written.ENVIRONMENT)),
             attachments=log.attachments,
             content_digest=content_digest,
             cpu_s=1e-9 * np.array(cpu_ns, np.float64) if is_timed else np.full(len(cpu_ns), np.nan),
@@ -291,7 +296,7 @@ def read_solution(source: Source) -> SolutionRow:
     """Return a log's last solution, the best of the replicate; only its chunk is decompressed."""
     with _opened(source) as log:
         for _, _, message in log.reader.iter_messages(written.SOLUTION_TOPIC, reverse=True):
-            return messages.decode(SolutionRow, orjson.loads(message.data))
+            return decode(SolutionRow, orjson.loads(message.data))
         raise ValueError("no solution")
 
 
@@ -308,9 +313,9 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
         if len(names) * len(rows) * 8 > MAX_LOG:
             raise ValueError(f"{len(rows)} generations with {len(names)} different terms")
         for row in rows:
-            if messages.NONFINITE in row:
-                messages.restore(row)
-        fields = messages.field_types(GenerationRow).items()
+            if NONFINITE in row:
+                restore(row)
+        fields = field_types(GenerationRow).items()
         columns = {
             name: np.array([row[name] for row in rows], dtype=DTYPES[kind])
             for name, kind in fields
@@ -326,3 +331,58 @@ def decode_array(data: bytes) -> NDArray[Any]:
     """Return the array that a `.npy` attachment holds."""
     with unreadable_is_corrupt("attached array"):
         return read_npy(data)
+
+
+def decode_values(metadata: Mapping[str, str]) -> dict[str, Any]:
+    """Undo `encode_values`."""
+    return {name: orjson.loads(text) for name, text in metadata.items()}
+
+
+def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
+    """Undo `encode_values` of an environment, whose sections are mappings."""
+    environment = decode_values(metadata)
+    for section in ("versions", "platform", "cpu", "components"):
+        if not isinstance(environment.get(section, {}), dict):
+            raise ValueError(f"{section} is {str(environment[section])[:40]!r}")
+    return environment
+
+
+def decode(record: type[Row], row: dict[str, Any]) -> Row:
+    """Build a record from the decoded JSON of its message, or raise an error if it is none.
+
+    Keys that are no field of the record are left out.
+    """
+    if NONFINITE in row:
+        restore(row)
+    fields: dict[str, Any] = {}
+    kinds: Any = record
+    for name, kind in field_types(kinds).items():
+        value = row[name] if name in row else record._field_defaults[name]
+        if not isinstance(value, _TAKEN[kind]) or (value is True or value is False) is not (
+            kind in _TRUTHS and value is not None
+        ):
+            raise ValueError(f"{name} is {str(value)[:40]!r}")
+        if kind is float or kind is int:
+            value = kind(value)
+        elif kind == FloatArray:
+            value = np.array(value, dtype=np.float64)
+            if value.ndim != 1:
+                raise ValueError(f"{name} is no list of numbers")
+        fields[name] = value
+    if "terms" in record._fields:
+        fields["terms"] = {
+            intern(name[5:]): float(value) for name, value in row.items() if name[:5] == TERM
+        }
+    if record is FrontRow:  # a matrix travels flat
+        fields["criteria"] = fields["criteria"].reshape(-1, row["num_criteria"])
+    return record(**fields)
+
+
+def restore(row: dict[str, Any]) -> None:
+    """Put the non-finite numbers of a decoded row that has the flag back in place."""
+    for name, flag in row[NONFINITE].items():
+        if isinstance(flag, str):
+            row[name] = float(flag)
+        else:
+            for index, element in flag.items():
+                row[name][int(index)] = float(element)

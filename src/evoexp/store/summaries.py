@@ -21,8 +21,8 @@ from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import GenerationRow, ReplicateSummary, flatten
 from evoexp.store.files import listed, reason, set_aside, warn, write_file
 from evoexp.store.identity import ORIGIN, run_context
+from evoexp.store.log import field_types
 from evoexp.store.log_reader import DTYPES, check_sums, generation_columns, read_summary
-from evoexp.store.messages import field_types
 from evoexp.store.run_directory import RunDirectory
 
 if TYPE_CHECKING:

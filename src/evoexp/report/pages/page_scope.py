@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, get_origin
 
 from evoexp.report.pages import markdown
-from evoexp.store.messages import TERM
+from evoexp.store.log import TERM
 
 CONDITION = "condition"  # the item that columns of summaries belong to
 COLUMNS = (  # of summaries, which pages may name beside the planner's own terms

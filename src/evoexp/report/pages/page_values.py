@@ -16,7 +16,7 @@ from evoexp.report.statistics.comparisons import (
     by_column,
     rows_by_name,
 )
-from evoexp.store.messages import TERM
+from evoexp.store.log import TERM
 
 FEW = 4  # conditions whose average costs can be drawn beside the best ones
 

@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.playback.recording import Heading, Recording, record
-from evoexp.playback.shapes import Outline
+from evoexp.playback.recording import Heading, Outline, Recording, record
 from evoexp.records import generations
 
 SAMPLES = {  # name: words, label, whether the search is run to its end

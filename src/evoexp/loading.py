@@ -10,9 +10,9 @@ import pandas as pd
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
-from evoexp.store.run_context import ORIGIN, origin_of, run_context
+from evoexp.store.identity import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
-from evoexp.store.tables import read_generations, read_summaries
+from evoexp.store.summaries import read_generations, read_summaries
 
 SEED = "seed"
 
@@ -105,7 +105,7 @@ def load(
             if re.fullmatch("[0-9a-fA-F]{1,64}", what):
                 raise
             raise UnknownOption("experiment or hash", what, known) from None
-        label = origin_of(run)["label"] or run.hash12
+        label = run.origin()["label"] or run.hash12
         runs, labels = [run], [(label, run.condition_id)]
     summaries = read_summaries(runs, thorough=True)  # first: what is damaged is left out
     summaries = summaries.assign(**_settings(runs, summaries))

@@ -30,7 +30,7 @@ from evoexp.store import summaries
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.tables import read_summaries
+from evoexp.store.summaries import read_summaries
 
 Fail = Callable[[str], None]
 REASON = "ArithmeticError: replicate {} is [bold]told[/] to fail"

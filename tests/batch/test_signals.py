@@ -27,7 +27,7 @@ from evoexp.commands.interruption import Interrupted, Interruption
 from evoexp.condition import Condition
 from evoexp.errors import Busy
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.tables import read_summaries
+from evoexp.store.summaries import read_summaries
 from matrix import examples
 
 COMMAND = ["run", *WORDS, "runner.num_workers=2", "--no-report"]

@@ -22,7 +22,7 @@ from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.tables import read_summaries
+from evoexp.store.summaries import read_summaries
 from hostile_data import mutated, refusal
 from matrix import counts, matrices_are_asked_for
 from shipped_conditions import Kind, of_kind

@@ -21,7 +21,7 @@ from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.shipped import Shipped
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.tables import read_summaries
+from evoexp.store.summaries import read_summaries
 from store_lookup import find_runs
 
 PLANAR = ("experiment=rana_planar", *SMALL)

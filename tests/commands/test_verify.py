@@ -16,7 +16,7 @@ import evoexp as package
 from evoexp.commands import verify
 from evoexp.errors import DamagedStore
 from evoexp.planners.via_point_ga.planner import ViaPointGa
-from evoexp.store import run_directory
+from evoexp.store import identity
 from evoexp.store.log import SUMMARY
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -198,14 +198,14 @@ def test_a_directory_that_may_not_be_read_hides_no_other(
     evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As root reads everything, the refusal is played."""
-    known, listed = run_directory.stored_id, Path.iterdir
+    known, listed = identity.stored_id, Path.iterdir
 
     def forbidden(path: Path) -> Path:
         if path == run.path:
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
         return path
 
-    monkeypatch.setattr(run_directory, "stored_id", lambda path: known(forbidden(path)))
+    monkeypatch.setattr(identity, "stored_id", lambda path: known(forbidden(path)))
     monkeypatch.setattr(Path, "iterdir", lambda path: listed(forbidden(path)))
     said = evoexp("verify", "--json")
     assert said.code == 1

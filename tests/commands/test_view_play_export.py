@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from command_samples import Evoexp
 
-from evoexp.store.run_context import origin_of
 from store_lookup import find_runs
 
 Refused = Callable[..., str]
@@ -44,7 +43,7 @@ def test_view_puts_two_runs_side_by_side(
     text = path.read_text()
     assert all(run in text for run in runs)
     for run in find_runs(stored):  # named as `list` names them
-        origin = origin_of(run)
+        origin = run.origin()
         title = json.dumps(f"{origin['experiment']} · {origin['label']}")
         assert f'"title":{title}' in text
 

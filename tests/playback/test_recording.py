@@ -6,11 +6,9 @@ import pytest
 from evoexp.collision.scene import Part, Scene, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.planners.proofs import judge_motion
-from evoexp.playback.body_poses import MAX_TICKS, points, ticks
 from evoexp.playback.contacts import clearance, remainder
-from evoexp.playback.recording import Recording
-from evoexp.playback.shapes import outline
-from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
+from evoexp.playback.recording import MAX_TICKS, Recording, outline, points, ticks
+from evoexp.playback.trajectory import SpeedLimits, seconds_per_instant, velocities
 from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 NAMES = sorted(SAMPLES)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from evoexp.condition import Prepared
-from evoexp.playback.shapes import Outline
+from evoexp.playback.recording import Outline
 from evoexp.records import FloatArray
 from evoexp.report.figures import motion_scenes, surfaces
 from evoexp.report.figures.style import drawn

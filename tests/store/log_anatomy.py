@@ -13,8 +13,7 @@ from mcap import records as mcap
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 
-from evoexp.store.digests import message_bytes
-from evoexp.store.log import CONTENT_DIGEST, SUMMARY
+from evoexp.store.log import CONTENT_DIGEST, SUMMARY, message_bytes
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")

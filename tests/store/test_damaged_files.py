@@ -1,5 +1,6 @@
 """Damaged files of a store: left out by readers, set aside by the writer, never deleted."""
 
+import functools
 import hashlib
 import json
 import os
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from store_samples import CONDITION, CONFIG, ENVIRONMENT, SUMMARY, generations, write
+from store_samples import CONDITION, CONFIG, SUMMARY, generations, write
 
 from evoexp import attachments
 from evoexp.commands.chosen_motions import chosen_log
@@ -203,23 +204,24 @@ def test_a_lost_configuration_is_taken_from_a_log(
     assert [each.condition_id for each in find_runs(tmp_path)] == [CONDITION]
     with pytest.warns(DamagedStore, match=r"config\.json: .*; taken from 0001\.mcap"):
         assert run.config_json() == CONFIG
-    with pytest.warns(DamagedStore, match=r"manifest\.json: .*; taken from 0001\.mcap"):
-        manifest = run.manifest()
-    restored = {"git": None, "restored_from": "0001.mcap"}
-    assert manifest == {"condition": CONDITION, **ENVIRONMENT, **restored}
     assert set(run.damaged_files(CONFIG)) == {"config.json", "manifest.json"}
     mended(run, "and written again: config.json", "and run again: 0000.mcap")
-    run.create(CONFIG, manifest)
+    run.create(CONFIG, {})
     assert not run.damaged_files(CONFIG)
-    assert (run.config_json(), run.manifest()) == (CONFIG, manifest)
+    assert run.config_json() == CONFIG
     assert (run.path / "config.json.damaged").exists() == (content is not None)
 
 
-def test_a_manifest_of_another_run_is_foreign(run: RunDirectory, add: Add) -> None:
-    add(0)
-    (run.path / "manifest.json").write_text(json.dumps({"condition": "f" * 64}))
-    with pytest.warns(DamagedStore, match="is of run ffffffffffff"):
-        assert run.manifest()["restored_from"] == "0000.mcap"
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [('{"condition": ', "damaged"), (f'{{"condition": "{"f" * 64}"}}', "is of run")],
+)
+def test_a_lost_manifest_is_named_with_the_command_that_renews_it(
+    run: RunDirectory, content: str, why: str
+) -> None:
+    (run.path / "manifest.json").write_text(content)
+    with pytest.warns(DamagedStore, match=rf"manifest\.json: {why}.*Mend it: evoexp run"):
+        assert run.manifest() == {}
 
 
 def test_the_manifest_alone_knows_the_name(run: RunDirectory, tmp_path: Path) -> None:
@@ -242,14 +244,9 @@ def test_damage_is_named_and_a_damaged_run_hides_no_other(
         run.failure(1)
     (run.path / "manifest.json").write_text('{"condition": ')
     (run.path / "config.json").write_bytes(CONFIG[:-1])
-    for action, name in (
-        (run.manifest, "manifest"),
-        (run.check, "config"),
-        (run.config_json, "config"),
-        (lambda: run.create(CONFIG, {}), "config"),
-        (lambda: resolve(tmp_path, run.hash12), "config"),
-    ):
-        with pytest.raises(StoreError, match=rf"{name}\.json: damaged"):
+    create = functools.partial(run.create, CONFIG, {})
+    for action in (run.check, run.config_json, create, lambda: resolve(tmp_path, run.hash12)):
+        with pytest.raises(StoreError, match=r"config\.json: damaged"):
             action()
     other = other_run(tmp_path)
     assert [each.path for each in find_runs(tmp_path)] == [other.path]

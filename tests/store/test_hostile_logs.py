@@ -32,7 +32,7 @@ from confinement import confined, no_longer
 from evoexp.commands.show import log_facts, screen
 from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.records import FrontRow
-from evoexp.store import log_bounds, log_reader
+from evoexp.store import log_reader
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 from matrix import counts, examples, matrices_are_asked_for
 from test_input_files import OTHERS
@@ -46,7 +46,7 @@ READERS: tuple[Callable[[Any], object], ...] = (
 )
 NUM_LOGS = counts(10_000, 100_000) if matrices_are_asked_for() else 300
 # [MiB] beyond what the process has: for logs of a few kB, and for those as large as they may be
-LITTLE, MOST = 500, 10 * log_bounds.MAX_LOG // 2**20
+LITTLE, MOST = 500, 10 * log_reader.MAX_LOG // 2**20
 
 
 def whole_log() -> bytes:
@@ -176,9 +176,8 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, share: int
 ) -> None:
     """The costliest log is one of short numbers, or of many small generations."""
-    for module in (log_bounds, log_reader):
-        for name in {"MAX_LOG", "MAX_MESSAGE", "MAX_CHUNK"} & vars(module).keys():
-            monkeypatch.setattr(module, name, getattr(module, name) // share)
+    for name in ("MAX_LOG", "MAX_MESSAGE", "MAX_CHUNK"):
+        monkeypatch.setattr(log_reader, name, getattr(log_reader, name) // share)
     (parts, first), size = opened(), 2**22 // share
     long = b'{"generation":0,"cost":1,"values":[' + b"0," * (size // 2) + b"0]}"
     messages = (body for opcode, body in records(first.body) if opcode == Opcode.MESSAGE)
@@ -186,7 +185,7 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
     short = b"".join(message(1, GOOD % (k, b"")) for k in range(size // 250))
     for body in (message(channel, long), short):
         whole = put_together([*parts, *[Part(Opcode.CHUNK, body)] * 28])
-        assert 28 * size > log_bounds.MAX_LOG * 0.8
+        assert 28 * size > log_reader.MAX_LOG * 0.8
         assert confined(functools.partial(attempt, whole), tmp_path, MOST // share) == []
 
 

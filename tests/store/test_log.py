@@ -1,7 +1,10 @@
-"""What is written comes back as it was, and the same content gives the same digests."""
+"""What is written comes back as it was, and the same content gives the same digests.
+
+A damaged log is always recognised, by one line that names it, and never by another exception.
+"""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -11,13 +14,16 @@ import orjson
 import pytest
 import xxhash
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
 from store_samples import CONDITION, CONFIG, ENVIRONMENT, SUMMARY, generations, write
 
+from evoexp.errors import CorruptLog
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.records import Block, FrontRow, Generation, GenerationRow
-from evoexp.store.digests import Chain, array_bytes
-from evoexp.store.log import Finished, Log
+from evoexp.store import log as log_module
+from evoexp.store.log import Finished, Log, array_bytes
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
+from forged_logs import with_metadata
 from masked_logs import TIMES, masked_log
 
 FRONT = FrontRow(4, 0, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
@@ -140,17 +146,19 @@ def test_other_readers_of_mcap_find_their_way() -> None:
 
 
 def test_the_chain_is_the_documented_hash_and_refuses_other_generators() -> None:
-    bits = np.random.PCG64(3)
-    rng = np.random.Generator(bits)
-    costs, best, population = rng.random(5), rng.random(4), rng.random((5, 4))
-    chain, before, content = Chain(rng), b"", costs.tobytes() + best.tobytes()
-    for _ in range(2):
-        before = xxhash.xxh3_128(before + content + state_bytes(bits)).digest()
-        assert chain.extend(array_bytes(costs), array_bytes(best), chain.state()) == before.hex()
+    rng, link, links = np.random.default_rng(3), b"", []
+    log = Log(CONDITION, CONFIG, 7, rng)
+    for each in generations(4):
+        log.write(Block.of(each))
+        content = each.costs.tobytes() + each.best.tobytes() + state_bytes(rng.bit_generator)
+        link = xxhash.xxh3_128(link + content).digest()
+        links.append(link.hex())
         rng.random()
-    assert chain.finish(population) == xxhash.xxh3_128_hexdigest(before + population.tobytes())
+    read = read_log(log.finish(SUMMARY).content)
+    assert [row.chain for row in read.generations] == links
+    assert read.summary.digest == xxhash.xxh3_128_hexdigest(link + each.population.tobytes())
     with pytest.raises(TypeError, match="PCG64.*MT19937"):
-        Chain(np.random.Generator(np.random.MT19937(0)))
+        Log(CONDITION, CONFIG, 7, np.random.Generator(np.random.MT19937(0)))
 
 
 def test_bytes_of_arrays_are_those_of_their_numbers() -> None:
@@ -165,23 +173,6 @@ def test_bytes_of_arrays_are_those_of_their_numbers() -> None:
         assert array_bytes(other) == matrix.tobytes()
     assert array_bytes(np.array([1, 2], dtype=np.int16)) == np.array([1, 2]).tobytes()
     assert array_bytes(np.empty(0)) == b""
-
-
-def test_links_are_those_of_costs_one_by_one() -> None:
-    """Costs are searched for NaN many generations at a time; whole numbers may look like one."""
-    given, expected, rng = generations(150), [], np.random.default_rng(0)
-    for k in (3, 70, 149):
-        given[k].costs[2:3] = NAN_WITH_PAYLOAD
-    given[80] = given[80]._replace(costs=np.array([-1, 3]))
-    given[81] = given[81]._replace(costs=np.array([math.nan, 1.0], dtype=np.float32))
-    log, chain = Log(CONDITION, CONFIG, 7, rng), Chain(rng)
-    for generation in given:
-        log.write(Block.of(generation))
-        costs, best = array_bytes(generation.costs), array_bytes(generation.best)
-        expected.append(chain.extend(costs, best, chain.state()))
-        rng.random(3)
-    rows = read_log(log.finish(SUMMARY).content).generations
-    assert [row.chain for row in rows] == expected
 
 
 # Blocks
@@ -213,3 +204,103 @@ def test_blocks_give_the_log_of_their_generations(most: int, name: str) -> None:
         assert finished(in_blocks(given, most)).content == expected
         rows = read_log(expected).generations
         assert [row.terms[name] for row in rows] == [float(each.index) for each in given]
+
+
+# Damaged logs
+
+
+Reader = Callable[[bytes | Path], object]
+CONTENT, SMALL = write(generations(60)).content, generations(3)
+each_reader = pytest.mark.parametrize(
+    "reader", [read_log, read_summary, read_solution, generation_columns]
+)
+
+
+def refusal(reader: Reader, source: bytes | Path) -> str:
+    with pytest.raises(CorruptLog) as caught:
+        reader(source)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@each_reader
+def test_a_log_that_is_cut_or_altered_anywhere_is_refused(reader: Reader) -> None:
+    for size in range(0, len(CONTENT), 29):
+        refusal(reader, CONTENT[:size])
+    half, rng, damaged = len(CONTENT) // 2, np.random.default_rng(1), bytearray(CONTENT)
+    refusal(reader, CONTENT + CONTENT)
+    refusal(reader, CONTENT[:half] + bytes(half))
+    for position in rng.integers(len(CONTENT), size=500).tolist():
+        flip = int(rng.integers(1, 256))
+        damaged[position] ^= flip
+        refusal(reader, bytes(damaged))
+        damaged[position] ^= flip
+    reader(bytes(damaged))
+
+
+NO_SUMMARY = {
+    "index_types": IndexType.NONE,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
+
+
+def foreign(checksums: bool, **options: Any) -> bytes:
+    buffer = BytesIO()
+    writer = Writer(buffer, enable_data_crcs=checksums, **options)
+    writer.start()
+    schema = writer.register_schema("other", "jsonschema", b"{}")
+    writer.add_message(writer.register_channel("/generation", "json", schema), 0, b"{}", 0)
+    writer.finish()
+    return buffer.getvalue()
+
+
+OTHER_PROGRAM = "not a log of evoexp: an MCAP of another program"
+REASONS = {
+    "the last byte is missing": (CONTENT[:-1], "cut"),
+    "a byte more": (CONTENT + b"\0", "cut or overwritten"),
+    "nothing": (b"", "empty"),
+    "a table": (b"PAR1" * 100, "not an MCAP"),
+    "with checksums": (foreign(checksums=True), "evoexp.run"),
+    "without checksums": (foreign(checksums=False), OTHER_PROGRAM),
+    "without a summary": (foreign(checksums=False, **NO_SUMMARY), OTHER_PROGRAM),
+    "LZ4": (foreign(checksums=False, compression=CompressionType.LZ4), OTHER_PROGRAM),
+    "without chunks": (foreign(checksums=False, use_chunking=False), OTHER_PROGRAM),
+}
+
+
+@each_reader
+@pytest.mark.parametrize(("content", "reason"), REASONS.values(), ids=REASONS)
+def test_the_reason_is_told(reader: Reader, content: bytes, reason: str) -> None:
+    assert reason in refusal(reader, content)
+
+
+def test_the_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "0003.mcap"
+    assert refusal(read_log, path).startswith(f"{path}: cannot be read: No such file")
+    path.write_bytes(CONTENT[:100])
+    assert refusal(read_summary, path).startswith(f"{path}: cut")
+    assert refusal(read_log, tmp_path).startswith(f"{tmp_path}: cannot be read")
+
+
+@each_reader
+@pytest.mark.parametrize(("other", "age"), [(1, "an older"), (3, "a newer")])
+def test_other_schema_version(
+    reader: Reader, monkeypatch: pytest.MonkeyPatch, other: int, age: str
+) -> None:
+    monkeypatch.setattr(log_module, "SCHEMA_VERSION", other)
+    of_another_version = write(SMALL).content
+    reader(of_another_version)
+    monkeypatch.undo()
+    expected = f"written by {age} evoexp: schema version {other}, this one reads 2"
+    assert expected in refusal(reader, of_another_version)
+
+
+@pytest.mark.parametrize(
+    ("replicate", "reason"), [(8, "another replicate"), (None, "unreadable: ")]
+)
+def test_what_good_checksums_hide_is_seen(replicate: int | None, reason: str) -> None:
+    content = with_metadata(write(SMALL).content, log_module.SUMMARY, replicate=replicate)
+    assert reason in refusal(read_log, content)

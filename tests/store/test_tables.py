@@ -15,11 +15,10 @@ from store_samples import CONDITION, generations, write
 
 from evoexp.errors import DamagedStore
 from evoexp.records import ReplicateSummary
-from evoexp.store import summaries, tables
+from evoexp.store import summaries
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.summaries import whole_logs, write_summary
-from evoexp.store.tables import read_generations, read_summaries
+from evoexp.store.summaries import read_generations, read_summaries, whole_logs, write_summary
 
 Add = Callable[..., Finished]
 CONTEXT = ["planner", "seed"]  # of the sample's configuration
@@ -36,7 +35,7 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         monkeypatch.setattr(module, name, note)
 
     noted(summaries, "read_summary")
-    noted(tables, "generation_columns")
+    noted(summaries, "generation_columns")
     return replicates
 
 

@@ -8,7 +8,7 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
-from evoexp.store.log_bounds import MAX_LOG
+from evoexp.store.log import MAX_LOG
 
 GIGABYTE = 1000 * MEGABYTE
 LEAST_RECORD = 250  # [B] of a generation in a log, without the paper's own terms

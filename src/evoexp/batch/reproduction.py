@@ -21,9 +21,8 @@ from evoexp.errors import CorruptLog, EvoexpError, MissingDistribution
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import TIMES, ReplicateSummary, flatten
 from evoexp.registry import missing
-from evoexp.store.digests import array_bytes
 from evoexp.store.files import reason
-from evoexp.store.log import ARRAY
+from evoexp.store.log import ARRAY, array_bytes
 from evoexp.store.log_reader import LogContents, Place, decode_array, read_log
 from evoexp.store.manifest import differences
 

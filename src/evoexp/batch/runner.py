@@ -16,7 +16,6 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests
-from evoexp.store.identity import MANIFEST, restored_manifest
 from evoexp.store.integrity import lost_replicates, mend
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
@@ -91,11 +90,8 @@ class Batch:
                     for key, run in self.runs.items():
                         condition, _, notes = self._wanted[key]
                         config_json = condition.to_json()
-                        # of a run that has lost its manifest, a log knows something of it
-                        is_lost = run.completed() and not (run.path / MANIFEST).exists()
-                        known = restored_manifest(run.path, key) if is_lost else {}
-                        known = known or manifest(key, guests(config_json))
-                        run.create(config_json, known | notes, condition.files())
+                        manifested = manifest(key, guests(config_json)) | notes
+                        run.create(config_json, manifested, condition.files())
                     for key in dict.fromkeys(job.condition_id for job in self.jobs):
                         self.runs[key].note_plan(self._wanted[key][1])
                     for outcomes in self._outcomes(workers):

@@ -17,13 +17,12 @@ from evoexp.configuration import compose
 from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
 from evoexp.paths.motion import Motion
 from evoexp.playback.recording import Heading, Recording, joints_of, record, record_motion
-from evoexp.playback.timing import SpeedLimits
+from evoexp.playback.trajectory import SpeedLimits
 from evoexp.playback.trajectory_files import JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table
 
@@ -112,7 +111,7 @@ def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) 
     """Return the motion of a log's best solution; the log alone is enough."""
     contents, title = read_log(log), log.name
     if run is not None:
-        origin = origin_of(run)
+        origin = run.origin()
         names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
         title = " · ".join(dict.fromkeys(names)) or run.hash12
     try:

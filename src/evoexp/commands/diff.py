@@ -12,9 +12,8 @@ from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
 from evoexp.errors import UnknownHash, printable
 from evoexp.records import TIMES
-from evoexp.store.identity import TAKEN
+from evoexp.store.identity import TAKEN, typed_parts
 from evoexp.store.manifest import changed, differences
-from evoexp.store.run_context import typed_parts
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 

@@ -13,8 +13,7 @@ from evoexp.commands.chosen_motions import (
 )
 from evoexp.commands.console import say
 from evoexp.errors import SettingError
-from evoexp.playback.joint_limits import joint_limits
-from evoexp.playback.trajectory import as_csv, as_json, as_ros, trajectory
+from evoexp.playback.trajectory import as_csv, as_json, as_ros, joint_limits, trajectory
 
 ANSWERS = {True: "yes", False: "no", None: "undecided"}
 

@@ -14,7 +14,7 @@ from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.store.files import listed
-from evoexp.store.run_context import ORIGIN, origin_of
+from evoexp.store.identity import ORIGIN
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import damaged_logs, summary_table
 
@@ -76,7 +76,7 @@ def _failures(stored: Iterable[NamedRun]) -> list[dict[str, Any]]:
     for name, run in stored:
         if isinstance(run, EvoexpError) or not run.failed():
             continue
-        label = origin_of(run)["label"] or ""
+        label = run.origin()["label"] or ""
         for replicate in sorted(run.failed()):
             try:
                 reason = str(run.failure(replicate)["reason"])
@@ -111,7 +111,7 @@ def run_row(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
         "certified": sum(each["certified"] is True for each in done) if moved else None,
         "median_best_cost": np.median([each["best_cost"] for each in done]) if done else None,
         "median_cpu_s": np.median([each["cpu_s"] for each in done]) if done else None,
-        **origin_of(run),
+        **run.origin(),
         "damage": f"damaged: {listed(damaged)}" if damaged else None,
     }
 

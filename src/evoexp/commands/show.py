@@ -38,10 +38,9 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, components_in, lacking, registered
-from evoexp.store.identity import TAKEN
+from evoexp.store.identity import ORIGIN, TAKEN, typed_parts
 from evoexp.store.log_reader import LogContents, read_log
 from evoexp.store.manifest import differences, environment, leaves
-from evoexp.store.run_context import ORIGIN, origin_of, typed_parts
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
@@ -173,7 +172,7 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
 def stored_facts(run: RunDirectory, place: str) -> dict[str, Any]:
     """Return the facts about a stored run; an archive's command is none to be typed."""
     manifest = run.manifest()
-    origin = {TAKEN: manifest.get(TAKEN), **{name: origin_of(run)[name] for name in ORIGIN}}
+    origin = {TAKEN: manifest.get(TAKEN), **{name: run.origin()[name] for name in ORIGIN}}
     if TAKEN not in manifest:
         origin["command"] = manifest.get("command")
     origin |= {"options": manifest.get("options"), "code": manifest.get("git"), "directory": place}

@@ -13,7 +13,7 @@ from evoexp.report.pages.build import ReportFiles
 from evoexp.report.pages.html_page import HTML, Paper, StoredRun, home_page, summaries
 from evoexp.report.statistics.judging import registered_rules
 from evoexp.store.files import write_file
-from evoexp.store.run_context import ORIGIN, origin_of
+from evoexp.store.identity import ORIGIN
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written
@@ -51,7 +51,7 @@ def home_files() -> ReportFiles:
         if isinstance(run, EvoexpError):
             runs.append(StoredRun(name, "", "", "", 0, 0, 0, str(run)))
             continue
-        origin = origin_of(run)
+        origin = run.origin()
         experiment, label, budget = (str(origin[key] or "") for key in ORIGIN)
         budget += ", changed" * bool(budget and origin["changed"])
         counts = len(run.completed()), run.num_planned(), len(run.failed())

@@ -27,9 +27,8 @@ from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.mesh_pieces import convex_shape
-from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.grid_motion import GridMotion
-from evoexp.scenarios.link_motion import LinkMotion
+from evoexp.scenarios.motion_tasks import ArmMotion, LinkMotion
 from evoexp.scenarios.moveit import MoveitTask
 
 ROUNDING = 1e-9  # [rad, m] by which an end may lie beyond a limit

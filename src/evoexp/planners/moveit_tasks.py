@@ -13,7 +13,7 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mesh_pieces import loaded_mesh
 from evoexp.robots.poses import frame_pose, local_pose
-from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.motion_tasks import ArmMotion
 from evoexp.scenarios.moveit import LinkGoal, MoveitTask
 from evoexp.scenarios.moveit_files import Pose
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask

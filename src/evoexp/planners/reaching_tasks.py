@@ -9,7 +9,7 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError, demand
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.scenarios.pick_and_place import PickAndPlace
+from evoexp.scenarios.motion_tasks import PickAndPlace
 
 ANYWHERE = np.array([-np.inf, np.inf, -np.inf, np.inf])  # the box of the first sub-path
 

@@ -2,48 +2,55 @@
 
 The clock is that of the trajectory: 0 at the start, as fast as the joints' speed limits permit. The
 progress of the search is counted in generations instead; it stands in one message at the start,
-whose arrays Foxglove's Plot panel draws.
+whose arrays Foxglove's Plot panel draws. Bodies are scene primitives of exactly the sizes of coal's
+shapes.
 """
 
 import io
 import json
 from collections import Counter
+from collections.abc import Iterable
 from importlib import resources
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
-from evoexp.playback.drawing import WORLD, bodies, frame_names, ghosts, marks
-from evoexp.playback.recording import Recording
+from evoexp.playback.colours import OBJECT, OBSTACLE, arm_colour
+from evoexp.playback.recording import Outline, Recording, Shape
+from evoexp.records import FloatArray
 
 LIBRARY = "evoexp"
 MOTION = "evoexp.motion"  # name of the metadata record
 LAYOUT = "foxglove_layout.json"
 SECOND = 1_000_000_000  # [ns]
 CHUNK_SIZE = 56 * 1024  # [B]
+WORLD = "world"
+LINE_WIDTH, WAY_WIDTH = 5.0, 2.0  # [px] of links that have no thickness, and of the tools' ways
+TARGET = "#882255"
+SLAB = 0.01  # [-] of the view's radius: thickness of half-spaces, which have no end
+FAR = 6.0  # [-] of the view's radius: their edges
+OPACITY = {"arm": 1.0, "object": 0.9, "obstacle": 0.45, "start": 0.2, "end": 0.35}
+Fields = dict[str, Any]
+"""Fields of a protobuf message, by their names."""
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
-NUMBERS = {"type": "array", "items": NUMBER}
-CLEARANCE = {
-    "title": "evoexp.Clearance",
-    "type": "object",
-    "properties": dict.fromkeys(("instant", "clearance", "required", "contact"), NUMBER)
-    | {"pair": TEXT},
+CLEARANCE = dict.fromkeys(("instant", "clearance", "required", "contact"), NUMBER) | {"pair": TEXT}
+IMPROVEMENTS = {key: {"type": "array", "items": NUMBER} for key in ("generation", "best_cost")}
+SCHEMAS: dict[str, dict[str, Any]] = {  # topic → schema of our own
+    "/clearance": {"title": "evoexp.Clearance", "type": "object", "properties": CLEARANCE},
+    "/improvements": {"title": "evoexp.Improvements", "type": "object", "properties": IMPROVEMENTS},
 }
 ANSWERS = {
     True: "certified: no two bodies ever touch",
     False: "refuted: bodies touch",
     None: "undecided",
-}
-IMPROVEMENTS = {
-    "title": "evoexp.Improvements",
-    "type": "object",
-    "properties": {"generation": NUMBERS, "best_cost": NUMBERS},
 }
 
 
@@ -74,7 +81,7 @@ def playable_log(recording: Recording) -> bytes:
     rows = [row for row in recording.heading.improvements if np.isfinite(row[1])]
     if rows:
         columns = dict(zip(("generation", "best_cost"), zip(*rows, strict=True), strict=True))
-        out.json("/improvements", IMPROVEMENTS, 0, columns)
+        out.message("/improvements", 0, columns)
     for moment, message in _log_messages(recording):
         out.message("/log", moment, message)
     for k, instant in enumerate(recording.times.tolist()):
@@ -95,7 +102,7 @@ def playable_log(recording: Recording) -> bytes:
             "pair": clearance.pairs[k],
         }
         values |= {"clearance": least} if np.isfinite(least) else {}
-        out.json("/clearance", CLEARANCE, now, values)
+        out.message("/clearance", now, values)
     out.writer.finish()
     return out.buffer.getvalue()
 
@@ -122,24 +129,21 @@ class _Playable:
         self._counts = Counter[int]()  # messages of each channel
 
     def message(self, topic: str, moment: int, message: Any) -> None:
-        """Append a message of a protobuf schema."""
-        kind = type(message)
+        """Append a message of a protobuf schema, or values of our own schema for the topic."""
+        kind, own = type(message), SCHEMAS.get(topic)
         if topic not in self._channels:
-            if kind not in self._schemas:
-                self._schemas[kind] = register_schema(self.writer, kind)
-            channel = self.writer.register_channel(topic, "protobuf", self._schemas[kind])
-            self._channels[topic] = channel
-        self._add(topic, moment, message.SerializeToString(deterministic=True))
-
-    def json(self, topic: str, schema: dict[str, Any], moment: int, values: dict[str, Any]) -> None:
-        """Append a message of one of our own schemas, which one topic has alone."""
-        if topic not in self._channels:
-            data = json.dumps(schema, separators=(",", ":")).encode()
-            number = self.writer.register_schema(schema["title"], "jsonschema", data)
-            self._channels[topic] = self.writer.register_channel(topic, "json", number)
-        self._add(topic, moment, json.dumps(values, allow_nan=False).encode())
-
-    def _add(self, topic: str, moment: int, data: bytes) -> None:
+            if own:
+                schema = json.dumps(own, separators=(",", ":")).encode()
+                number = self.writer.register_schema(own["title"], "jsonschema", schema)
+            else:
+                number = self._schemas.get(kind) or register_schema(self.writer, kind)
+                self._schemas[kind] = number
+            form = "json" if own else "protobuf"
+            self._channels[topic] = self.writer.register_channel(topic, form, number)
+        if own:
+            data = json.dumps(message, allow_nan=False).encode()
+        else:
+            data = message.SerializeToString(deterministic=True)
         channel = self._channels[topic]
         self.writer.add_message(channel, moment, data, moment, self._counts[channel])
         self._counts[channel] += 1
@@ -185,3 +189,120 @@ def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
         for instant, level, text in sorted(rows, key=lambda row: row[0])
         for now in [nanoseconds(recording, instant)]
     ]
+
+
+def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
+    """Return one entity per body of some roles, in the frame that moves it."""
+    names, radius = frame_names(recording), recording.view.radius
+    return [
+        _body(shape, names[shape.frame], OPACITY[shape.role], radius)
+        for shape in recording.shapes
+        if shape.role in roles
+    ]
+
+
+def ghosts(recording: Recording) -> list[Any]:
+    """Return translucent copies of all moving bodies at the start and at the end."""
+    entities = []
+    for when, tick in (("start", 0), ("end", -1)):
+        for shape in recording.shapes:
+            if shape.frame >= 0:
+                pose = recording.world_pose(shape, tick)
+                ghost = shape._replace(name=f"{when} of {shape.name}", pose=pose)
+                entities.append(_body(ghost, WORLD, OPACITY[when], recording.view.radius))
+    return entities
+
+
+def marks(recording: Recording) -> list[Any]:
+    """Return the paths of the tools, and the targets of the task."""
+    entities = []
+    for arm, way in enumerate(recording.traces):
+        line = _line(way, WAY_WIDTH, _colour(arm_colour(arm), 1.0))
+        entities.append(_entity(f"way of arm {arm + 1}", WORLD, lines=[line]))
+    colour, across = _colour(TARGET, 1.0), 0.02 * recording.view.radius
+    for target in recording.targets:
+        place = pin.SE3(np.eye(3), target.point)
+        text: Fields = {"pose": _pose(place), "color": colour, "text": f" {target.name}"}
+        text |= {"billboard": True, "font_size": 14.0, "scale_invariant": True}
+        ball = _solid(place, (across,) * 3, colour)
+        entities.append(_entity(f"target {target.name}", WORLD, spheres=[ball], texts=[text]))
+    return entities
+
+
+def frame_names(recording: Recording) -> list[str]:
+    """Return the names of all frames; the world comes last, so index −1 is the world."""
+    return [*(frame.name for frame in recording.frames), WORLD]
+
+
+def _body(shape: Shape, frame: str, opacity: float, radius: float) -> Any:
+    """Return a body in a frame as one entity, in a view of a radius."""
+    colours = {"arm": arm_colour(shape.arm), "object": OBJECT, "obstacle": OBSTACLE}
+    colour, place = _colour(colours[shape.role], opacity), pin.XYZQUATToSE3(shape.pose)
+    return _entity(shape.name, frame, **_primitives(shape.outline, place, colour, radius))
+
+
+def _entity(name: str, frame: str, **primitives: Any) -> Any:
+    return SceneEntity(frame_id=frame, id=name, frame_locked=True, **primitives)
+
+
+def _primitives(
+    outline: Outline, place: Any, colour: Fields, radius: float
+) -> dict[str, list[Fields]]:
+    kind, size = outline.kind, outline.size
+    if outline.is_line:
+        ends = [place * np.array([0.0, 0.0, z]) for z in (-0.5 * size[1], 0.5 * size[1])]
+        return {"lines": [_line(ends, LINE_WIDTH, colour)]}
+    if kind == "box":
+        return {"cubes": [_solid(place, size, colour)]}
+    if kind in ("sphere", "ellipsoid"):
+        axes = size * 3 if kind == "sphere" else size
+        return {"spheres": [_solid(place, [2.0 * axis for axis in axes], colour)]}
+    if kind == "half_space":
+        depth, edge = SLAB * radius, FAR * radius
+        return {"cubes": [_solid(_along_z(place, -0.5 * depth), (edge, edge, depth), colour)]}
+    if outline.points is not None and outline.triangles is not None:
+        points, indices = map(_vector, outline.points), outline.triangles.ravel().tolist()
+        mesh = {"pose": _pose(place), "points": [*points], "color": colour, "indices": indices}
+        return {"triangles": [mesh]}
+    across, length = 2.0 * size[0], size[1]
+    cylinder = _solid(place, (across, across, length), colour)
+    cylinder |= {"bottom_scale": 1.0, "top_scale": 0.0 if kind == "cone" else 1.0}
+    if kind != "capsule":
+        return {"cylinders": [cylinder]}
+    ends = [_along_z(place, z) for z in (-0.5 * length, 0.5 * length)]
+    balls = [_solid(end, (across,) * 3, colour) for end in ends]
+    return {"cylinders": [cylinder], "spheres": balls}
+
+
+def _line(points: Iterable[FloatArray], width: float, colour: Fields) -> Fields:
+    """Return a strip of lines of a width [px]."""
+    return {
+        "type": "LINE_STRIP",
+        "pose": _pose(pin.SE3.Identity()),
+        "thickness": width,
+        "scale_invariant": True,
+        "points": [_vector(point) for point in points],
+        "color": colour,
+    }
+
+
+def _solid(place: Any, size: Iterable[float], colour: Fields) -> Fields:
+    return {"pose": _pose(place), "size": _vector(size), "color": colour}
+
+
+def _along_z(place: Any, z: float) -> Any:
+    return place * pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
+
+
+def _pose(place: Any) -> Fields:
+    row = pin.SE3ToXYZQUAT(place).tolist()
+    return {"position": _vector(row[:3]), "orientation": dict(zip("xyzw", row[3:], strict=True))}
+
+
+def _vector(values: Iterable[float]) -> dict[str, float]:
+    return dict(zip("xyz", map(float, values), strict=True))
+
+
+def _colour(colour: str, opacity: float) -> Fields:
+    parts = (value / 255.0 for value in bytes.fromhex(colour[1:]))
+    return dict(zip("rgba", (*parts, opacity), strict=True))

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from evoexp.playback.colours import arm_colour
-from evoexp.playback.recording import Recording
-from evoexp.playback.shapes import Shape
+from evoexp.playback.recording import Recording, Shape
 from evoexp.records import FloatArray
 
 DIGITS = 6  # significant, of distances
@@ -39,7 +38,6 @@ def page(recordings: Sequence[Recording]) -> bytes:
 
 
 def _motion(recording: Recording) -> dict[str, Any]:
-    """Return the data of a motion for the script of the page."""
     clearance, verdict = recording.clearance, recording.verdict
     pairs = list(dict.fromkeys(clearance.pairs))
     margin = {}  # the second badge, where a margin is required and no bodies touch

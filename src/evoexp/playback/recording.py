@@ -1,23 +1,31 @@
-"""The recording of one motion, from which pages, playable logs and trajectories are written."""
+"""The recording of one motion, from which pages, playable logs and trajectories are written.
+
+Bodies are drawn with the sizes of the coal shapes that the certifier judges.
+"""
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.certifier.certificate import Certificate, certificate
 from evoexp.collision.scene import Part, Scene
 from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
-from evoexp.playback.body_poses import Frame, Poses, points, poses, ticks
-from evoexp.playback.contacts import Clearance, clearance
-from evoexp.playback.shapes import Role, Shape, outline, pose
-from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
+from evoexp.playback.contacts import Clearance, clearance, part_at
+from evoexp.playback.trajectory import SpeedLimits, seconds_per_instant, velocities
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 
+Kind = Literal["box", "sphere", "ellipsoid", "capsule", "cylinder", "cone", "half_space", "mesh"]
+Role = Literal["arm", "obstacle", "object"]
+MIN_TICKS, MAX_TICKS = 240, 600  # of a whole motion
+TURN = np.radians(2.0)  # [rad] of a joint between two ticks, where there may be so many
+SLIDE = 0.01  # [-] of the scene's size, of a sliding joint
 FAR = 3.0  # [-] obstacles larger than so many times the robot's room do not make the picture larger
 
 
@@ -34,11 +42,65 @@ class Heading(NamedTuple):
     improvements: tuple[tuple[int, float], ...] = ()
 
 
+class Outline(NamedTuple):
+    """A shape in its own frame; capsules, cylinders and cones lie along z and are centred."""
+
+    kind: Kind  # kind of the shape
+    # box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone: radius,
+    # length (that of a capsule is its segment's) | half-space (all points with z ≤ 0) and mesh:
+    # nothing
+    size: tuple[float, ...]
+    points: FloatArray | None = None  # (points, 3) corners of a mesh; None otherwise
+    triangles: np.ndarray | None = None  # (triangles, 3) indices of corners
+
+    @property
+    def is_line(self) -> bool:
+        """Return whether the shape has no thickness, so that the drawing chooses a thickness."""
+        return self.kind == "capsule" and self.size[0] == 0.0
+
+    @property
+    def half(self) -> FloatArray:
+        """Half the edges of a box around the shape and its frame, (3,); 0 for a half-space."""
+        if self.points is not None:
+            return np.full(3, np.sqrt((self.points**2).sum(axis=1).max()))
+        if self.kind in ("box", "ellipsoid"):
+            return np.array(self.size) * (0.5 if self.kind == "box" else 1.0)
+        radius, length = (*self.size, 0.0, 0.0)[:2]
+        round_end = radius if self.kind in ("sphere", "capsule") else 0.0
+        return np.array([radius, radius, 0.5 * length + round_end])
+
+
+class Shape(NamedTuple):
+    """One body."""
+
+    name: str  # name of the body in verdicts
+    frame: int  # index in `Recording.frames` of the frame that moves it; −1: the world
+    pose: FloatArray  # (7,) of the outline in that frame: position, quaternion x, y, z, w
+    outline: Outline  # kind and size
+    # A part of an arm, an obstacle, or an object, which is an obstacle that is carried for a while
+    role: Role
+    arm: int  # index of its arm; −1: none
+
+
 class Joint(NamedTuple):
     """One coordinate of q."""
 
     name: str  # name of the joint
     prismatic: bool  # whether the coordinate is a length, not an angle
+
+
+class Frame(NamedTuple):
+    """A frame that moves bodies: of a joint, or of an object that is carried."""
+
+    name: str  # unique name
+    parent: int  # index of the frame that carries it; −1: the world
+
+
+class Poses(NamedTuple):
+    """Poses of all frames over time."""
+
+    world: FloatArray  # (ticks, frames, 7) position, quaternion x, y, z, w in the world
+    local: FloatArray  # the same in the parent's frame
 
 
 class Target(NamedTuple):
@@ -218,3 +280,115 @@ def _corners(shape: Shape, world: FloatArray) -> FloatArray:
     turn, half = pin.XYZQUATToSE3(shape.pose), shape.outline.half
     corners = np.array([turn * (np.array(sign) * half) for sign in product((-1.0, 1.0), repeat=3)])
     return points(world, shape.frame, corners).reshape(-1, 3)
+
+
+def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
+    """Return the instants at which a motion is shown, (ticks,), its first and last among them.
+
+    Every instant is shown, unless there are more than `MAX_TICKS`. `prismatic` (nq,) is true for
+    coordinates that are lengths; `size` is the scene's [length unit].
+    """
+    segments = motion.num_segments
+    if segments == 0:
+        return np.zeros(1)
+    if segments >= MAX_TICKS:
+        return np.unique(np.round(np.linspace(0.0, segments, MAX_TICKS)))
+    steps = np.where(prismatic, SLIDE * size, TURN)
+    wanted = np.array([np.ceil((motion.speed_bound(k) / steps).max()) for k in range(segments)])
+    wanted = np.maximum(wanted, np.ceil(MIN_TICKS / segments))
+    if wanted.sum() > MAX_TICKS:
+        wanted = np.maximum(np.floor(wanted * (MAX_TICKS / wanted.sum())), 1.0)
+    pieces = [k + np.arange(count) / count for k, count in enumerate(wanted.astype(int))]
+    return np.concatenate([*pieces, [float(segments)]])
+
+
+def poses(
+    model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
+) -> Poses:
+    """Return the poses of all frames at times (ticks,) [instants].
+
+    Each part of the motion places the carried objects, which have frames of their own.
+    """
+    data, count = model.createData(), model.njoints - 1 + len(carried)
+    world, local = np.empty((2, len(times), count, 7))
+    places = {  # of each carried object: its joint, and its placement in the joint's frame
+        id(part): [part.scene.shapes[part.scene.names.index(name)][1:] for name in carried]
+        for part in parts
+    }
+    for k, t in enumerate(times):
+        pin.forwardKinematics(model, data, motion.at(float(t)))
+        for joint in range(1, model.njoints):
+            world[k, joint - 1], local[k, joint - 1] = pose(data.oMi[joint]), pose(data.liMi[joint])
+        for c, (joint, placement) in enumerate(places[id(part_at(parts, t))]):
+            world[k, model.njoints - 1 + c] = local[k, model.njoints - 1 + c] = pose(
+                data.oMi[joint] * placement
+            )
+    return Poses(_continuous(world), _continuous(local))
+
+
+def points(world: FloatArray, frame: int, point: FloatArray) -> FloatArray:
+    """Return the positions of a point (3,) of a frame (−1: the world) over time, (ticks, 3).
+
+    Of points (points, 3), the positions are (points, ticks, 3). `world` is (ticks, frames, 7).
+    """
+    ticks = len(world)
+    rows = np.broadcast_to(point[..., None, :], (*point.shape[:-1], ticks, 3))
+    if frame < 0:
+        return rows.copy()
+    x, y, z, w = world[:, frame, 3:].T
+    vector = np.stack([x, y, z], axis=1)
+    twice = 2.0 * np.cross(vector, rows)
+    return np.asarray(world[:, frame, :3] + rows + w[:, None] * twice + np.cross(vector, twice))
+
+
+def _continuous(rows: FloatArray) -> FloatArray:
+    """Choose between q and −q, which are one rotation: the sign nearer to the tick before."""
+    signs = np.sign((rows[1:, :, 3:] * rows[:-1, :, 3:]).sum(axis=-1))
+    flips = np.cumprod(np.where(signs < 0.0, -1.0, 1.0), axis=0)
+    rows[1:, :, 3:] *= flips[:, :, None]
+    return rows
+
+
+def outline(shape: Any) -> tuple[Outline, Any]:
+    """Return the outline of a coal shape, and the `pin.SE3` of its frame in that of the shape."""
+    here = pin.SE3.Identity()
+    if isinstance(shape, coal.Box):
+        return Outline("box", tuple(2.0 * float(half) for half in shape.halfSide)), here
+    if isinstance(shape, coal.Sphere):
+        return Outline("sphere", (float(shape.radius),)), here
+    if isinstance(shape, coal.Ellipsoid):
+        return Outline("ellipsoid", tuple(float(axis) for axis in shape.radii)), here
+    names: dict[Any, Kind] = {coal.Capsule: "capsule", coal.Cylinder: "cylinder", coal.Cone: "cone"}
+    if type(shape) in names:
+        sizes = float(shape.radius), 2.0 * float(shape.halfLength)
+        return Outline(names[type(shape)], sizes), here
+    if isinstance(shape, coal.Halfspace):
+        normal = np.array(shape.n)
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()
+        return Outline("half_space", ()), pin.SE3(turn, float(shape.d) * normal)
+    points, triangles = _mesh(shape)
+    return Outline("mesh", (), points, triangles), here
+
+
+def _mesh(shape: Any) -> tuple[FloatArray, np.ndarray]:
+    """Return corners and triangles of a mesh, each triangle counter-clockwise seen from outside."""
+    convex = hasattr(shape, "polygons")
+    if convex:
+        points = np.array([shape.point(k) for k in range(shape.num_points)])
+        faces = [shape.polygons(k) for k in range(shape.num_polygons)]
+    elif hasattr(shape, "tri_indices"):
+        points = np.array([shape.vertex(k) for k in range(shape.num_vertices)])
+        faces = [shape.tri_indices(k) for k in range(shape.num_tris)]
+    else:
+        raise UnsupportedShape(f"body: a {type(shape).__name__} cannot be drawn")
+    triangles = np.array([[int(face[k]) for k in range(3)] for face in faces], dtype=np.int64)
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    volumes = (np.cross(b - a, c - a) * (a - points.mean(axis=0))).sum(axis=1)
+    inward = volumes < 0.0 if convex else np.full(len(volumes), volumes.sum() < 0.0)
+    triangles[inward] = triangles[inward, ::-1]
+    return points, triangles
+
+
+def pose(placement: Any) -> FloatArray:
+    """Return a `pin.SE3` as position and quaternion x, y, z, w, (7,)."""
+    return np.asarray(pin.SE3ToXYZQUAT(placement))

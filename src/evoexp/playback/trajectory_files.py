@@ -14,13 +14,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import yaml
 
 from evoexp.errors import printable
 from evoexp.input_files import NUMBER, TableError, read_table
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.playback.recording import Joint
-from evoexp.playback.timing import hermite_motion
+from evoexp.playback.trajectory import hermite_motion
 from evoexp.records import FloatArray
 
 TURNS = {"rad": 1.0, "radian": 1.0, "radians": 1.0}
@@ -217,7 +218,6 @@ def _meaning(rest: str, units: set[str]) -> tuple[str, bool] | None:
 
 
 def _scaled(values: Values, joint: Joint, length_unit: str) -> FloatArray:
-    """Return values in rad, or in the scene's unit of length."""
     unit, numbers = values.unit, values.numbers
     known = {**TURNS, "": 1.0}
     if joint.prismatic:
@@ -243,8 +243,6 @@ def parse_message(text: str, is_yaml: bool) -> Any:
     """Return the content of a JSON or YAML file of one document, or raise ValueError."""
     if not is_yaml:
         return json.loads(text)
-    import yaml  # takes long to load
-
     try:
         documents = [each for each in yaml.safe_load_all(text) if each is not None]
     except yaml.YAMLError as error:

@@ -16,6 +16,7 @@ from evoexp.errors import SettingError, demand, demand_known
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
+from evoexp.scenarios import moveit_scene
 from evoexp.scenarios.moveit_files import (
     MAX_SCENE,
     REQUEST,
@@ -25,18 +26,7 @@ from evoexp.scenarios.moveit_files import (
     primitive_kind,
     read_document,
 )
-from evoexp.scenarios.moveit_scene import (
-    AllowedPairs,
-    Frames,
-    LoadMesh,
-    SceneMesh,
-    World,
-    check_robot_place,
-    has_other_frames,
-    read_allowed,
-    read_state,
-    read_world,
-)
+from evoexp.scenarios.moveit_scene import Frames, SceneMesh
 from evoexp.validation import Component, NonNegative, Positive
 
 if TYPE_CHECKING:
@@ -101,7 +91,7 @@ class MoveitTask(Component):
             settings[name] = {SHA256: keep(content)}
             _paths[settings[name][SHA256]] = path
             document = read_document(content, f"{field}.{name}: {path}", message)
-            if message == SCENE and has_other_frames(document):
+            if message == SCENE and moveit_scene.has_other_frames(document):
                 settings["frame_names"] = "header"
             # files of meshes, as robowflex names them
             things = document["world"]["collision_objects"] if message == SCENE else ()
@@ -115,9 +105,9 @@ class MoveitTask(Component):
         return settings
 
     @property
-    def allowed(self) -> AllowedPairs:
+    def allowed(self) -> moveit_scene.AllowedPairs:
         """The scene's allowed-collision matrix."""
-        return read_allowed(self._message("scene"))
+        return moveit_scene.read_allowed(self._message("scene"))
 
     @property
     def plan_request(self) -> Request:
@@ -127,16 +117,17 @@ class MoveitTask(Component):
     @property
     def state(self) -> dict[str, float]:
         """Joint names → positions at the start [rad, m]; the request's come before the scene's."""
-        return read_state(self._message("scene")["robot_state"]) | self.plan_request.start
+        scene = moveit_scene.read_state(self._message("scene")["robot_state"])
+        return scene | self.plan_request.start
 
-    def world(self, links: "LinkFrames | None", load: LoadMesh) -> World:
+    def world(self, links: "LinkFrames | None", load: moveit_scene.LoadMesh) -> moveit_scene.World:
         """Return the scene's objects, among a robot's links if these have names."""
         scene = self._message("scene")
-        if self.frame_names == "child" and has_other_frames(scene):
+        if self.frame_names == "child" and moveit_scene.has_other_frames(scene):
             must = "header, as MoveIt names frames: give the scene again and run it again"
             raise SettingError("scenario.frame_names", must, self.frame_names)
-        world = read_world(scene, links, self.meshes, load)
-        check_robot_place(self._message("request")["start_state"], world.frames)
+        world = moveit_scene.read_world(scene, links, self.meshes, load)
+        moveit_scene.check_robot_place(self._message("request")["start_state"], world.frames)
         return world
 
     def notes(self, robot: Any) -> tuple[str, ...]:
@@ -202,12 +193,11 @@ def read_request(request: MessagePart) -> Request:
     request.require(joints or len(places) == 1, must, f"{len(places)} positions")
     link = places[0]["link_name"].text if places else ""
     request.require(link or not places, "a goal of a link (link_name)", link)
-    start = read_state(request["start_state"])
+    start = moveit_scene.read_state(request["start_state"])
     return Request(request["group_name"].text, start, joints, link)
 
 
 def _goal(request: MessagePart) -> MessagePart:
-    """Return the only goal."""
     goals = list(request["goal_constraints"])
     must = "a request with one goal (goal_constraints)"
     request.require(len(goals) == 1, must, len(goals))

@@ -182,7 +182,6 @@ class MessagePart:
         return self._listed("xyz").numbers(3)
 
     def _listed(self, keys: str) -> "MessagePart":
-        """Return a mapping of coordinates as a list."""
         if not isinstance(self.value, dict):
             return self
         return MessagePart([self.value.get(key, 0) for key in keys], self.field, self.where)

@@ -223,7 +223,6 @@ def check_robot_place(state: MessagePart, frames: Frames) -> None:
 def _bodies(
     thing: MessagePart, name: str, frames: Frames, meshes: Mapping[str, Mesh]
 ) -> list[Obstacle]:
-    """Return the bodies of a collision object."""
     number = thing["operation"].value
     operation = OPERATIONS.get(str(number).lower(), number)
     must = f"a scene whose objects are there, '{name}'.operation ADD (0)"
@@ -339,7 +338,6 @@ def _mesh_hulls(
 
 
 def _own_triangles(mesh: MessagePart, name: str) -> Mesh:
-    """Read the corners and triangles that a message holds."""
     must = f"a mesh whose dimensions scale a resource at {mesh.where}"
     mesh.require(not mesh["dimensions"].value, must, name)
     corners = np.array([vertex.point for vertex in mesh["vertices"]])

@@ -21,7 +21,7 @@ from evoexp.errors import CorruptLog, EvoexpError, printable
 from evoexp.input_files import MAX_INPUT, MEGABYTE
 from evoexp.store.files import write_file, write_files
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, TAKEN
-from evoexp.store.log_bounds import MAX_LOG
+from evoexp.store.log import MAX_LOG
 from evoexp.store.log_reader import read_summary
 from evoexp.store.run_directory import HASH_LENGTH, RunDirectory
 

@@ -17,15 +17,7 @@ from typing import NamedTuple
 from evoexp.attachments import PREFIX
 from evoexp.errors import CorruptLog, EvoexpError, OtherVersion, StoreError
 from evoexp.records import ReplicateSummary
-from evoexp.store.files import (
-    MAX_NAMED,
-    is_set_aside,
-    is_temporary,
-    listed,
-    reason,
-    set_aside,
-    warn,
-)
+from evoexp.store import files
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES
 from evoexp.store.log_reader import LogContents, read_log, read_summary
 from evoexp.store.run_directory import RunDirectory, open_run
@@ -65,21 +57,20 @@ class RunCheck(NamedTuple):
 
 def check_run(outputs: Path, name: str) -> RunCheck:
     """Look at a stored run's files, but for its logs."""
-    path = outputs / "runs" / name
+    path, leftovers = outputs / "runs" / name, list[str]()
     try:
         names = [each.name for each in sorted(path.iterdir()) if each.name not in _KNOWN]
         for each in sorted((path / REPLICATES).glob("*")):
             if not RunDirectory.is_own(each.name):
                 names.append(f"{REPLICATES}/{each.name}")
-        kinds = {True: "temporary", False: "unknown"}
-        leftovers = [
-            f"{each} ({'set aside earlier' if is_set_aside(each) else kinds[is_temporary(each)]})"
-            for each in names
-        ]
+        for other in names:
+            kind = "temporary" if files.is_temporary(other) else "unknown"
+            kind = "set aside earlier" if files.is_set_aside(other) else kind
+            leftovers.append(f"{other} ({kind})")
         run = open_run(outputs, name)
         problems = run.damaged_files()
     except StoreError as error:
-        return RunCheck(name, None, {CONFIG: reason(path / CONFIG, error)}, leftovers)
+        return RunCheck(name, None, {CONFIG: files.reason(path / CONFIG, error)}, leftovers)
     except OSError as error:
         problem = f"{error.filename}: {error.strerror}; change its permissions"
         return RunCheck(name, None, {"cannot be read": problem}, [])
@@ -87,7 +78,7 @@ def check_run(outputs: Path, name: str) -> RunCheck:
     asked = run.num_asked()
     there = {k for k in run.completed() | run.failed() if k < asked}
     if len(there) < asked and not run.is_being_written():
-        first = list(itertools.islice((k for k in range(asked) if k not in there), MAX_NAMED))
+        first = list(itertools.islice((k for k in range(asked) if k not in there), files.MAX_NAMED))
         others = asked - len(there) - len(first)
         lost = ", ".join(map(str, first)) + (f" and {others} more" if others else "")
         problems[REPLICATES] = (
@@ -100,7 +91,7 @@ def check_run(outputs: Path, name: str) -> RunCheck:
             run.failure(replicate)
         except StoreError as error:
             failure = run.failure_path(replicate)
-            problems[failure.name] = reason(failure, error)
+            problems[failure.name] = files.reason(failure, error)
     return RunCheck(name, run, problems, leftovers)
 
 
@@ -119,9 +110,9 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
             try:
                 problem = next((f"altered: {each}" for each in evaluate(path, log)), "")
             except EvoexpError as error:
-                unevaluated = reason(path, error)
+                unevaluated = files.reason(path, error)
     except CorruptLog as error:
-        problem = reason(path, error)
+        problem = files.reason(path, error)
     if problem:
         with contextlib.suppress(CorruptLog):
             read_summary(path, place)
@@ -184,11 +175,11 @@ def lost_replicates(run: RunDirectory) -> set[int]:
     return {k for k in run.completed() - whole_logs(run) if k < asked}
 
 
-def _set_aside(run: RunDirectory, files: dict[str, str], then: str) -> None:
-    if not files:
+def _set_aside(run: RunDirectory, damaged: dict[str, str], then: str) -> None:
+    if not damaged:
         return
-    there = [run.path / name for name in files if os.path.lexists(run.path / name)]
-    names = [set_aside(path).name for path in there]
+    there = [run.path / name for name in damaged if os.path.lexists(run.path / name)]
+    names = [files.set_aside(path).name for path in there]
     kept = f"; kept as {', '.join(names[:2])}{', …' if len(names) > 2 else ''}" if names else ""
-    shown = {Path(name).name: why for name, why in files.items()}
-    warn(f"run {run.hash12}: damaged, and {then}: {listed(shown)}{kept}")
+    shown = {Path(name).name: why for name, why in damaged.items()}
+    files.warn(f"run {run.hash12}: damaged, and {then}: {files.listed(shown)}{kept}")

@@ -13,25 +13,9 @@ from filelock import FileLock, Timeout
 
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
+from evoexp.store import identity
 from evoexp.store.files import reason, remove_stale, sync_directory, warn, write_file, write_files
-from evoexp.store.identity import (
-    CONFIG,
-    MANIFEST,
-    PLANS,
-    REPLICATES,
-    RESTORED,
-    TAKEN,
-    DamagedFile,
-    Plan,
-    checked_manifest,
-    config_id,
-    lost_files,
-    read,
-    read_object,
-    restored_manifest,
-    stored_id,
-    whole_logs,
-)
+from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, DamagedFile, Plan
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
 COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
@@ -87,7 +71,7 @@ class RunDirectory:
 
     def check(self) -> None:
         """Raise StoreError unless `config.json` is this condition's; `DamagedFile` if damaged."""
-        stored = config_id(self.path)
+        stored = identity.config_id(self.path)
         if stored != self.condition_id:
             raise StoreError(
                 f"{self.path}: holds condition {stored}, which shares its first {HASH_LENGTH} "
@@ -108,15 +92,15 @@ class RunDirectory:
         """
         try:
             self.check()
-            content = read(self.path / CONFIG)
-            lost = [path for path, _ in lost_files(self.path, content)]
+            content = identity.read(self.path / CONFIG)
+            lost = [path for path, _ in identity.lost_files(self.path, content)]
             if not lost:
-                keep_all(map(read, sorted((self.path / PREFIX).glob("[0-9a-f]*"))))
+                keep_all(map(identity.read, sorted((self.path / PREFIX).glob("[0-9a-f]*"))))
                 return content
             error = StoreError(f"{lost[0]}: missing or damaged")
         except DamagedFile as damaged:
             error = damaged
-        for name, log in whole_logs(self.path, self.condition_id):
+        for name, log in identity.whole_logs(self.path, self.condition_id):
             warn(f"{error}; taken from {name}. Mend it: {self.command}")
             attached = log.attachments.items()
             keep_all(data for name, data in attached if name.startswith(PREFIX))
@@ -124,19 +108,16 @@ class RunDirectory:
         raise error
 
     def manifest(self) -> dict[str, Any]:
-        """Return the manifest that was written when the run was created.
-
-        Where it is lost, the environment of a log stands for it, which is said, or else StoreError
-        is raised.
-        """
+        """Return the manifest that was written when the run was created; a lost one is empty."""
         try:
-            return checked_manifest(self.path, self.condition_id)
+            return identity.checked_manifest(self.path, self.condition_id)
         except DamagedFile as error:
-            restored = restored_manifest(self.path, self.condition_id)
-            if not restored:
-                raise
-            warn(f"{error}; taken from {restored[RESTORED]}. Mend it: {COMMAND}")
-            return restored
+            warn(f"{error}. Mend it: {COMMAND}")
+            return {}
+
+    def origin(self) -> dict[str, Any]:
+        """Return the origin of the run, see `identity.origin`; by its hash alone if need be."""
+        return identity.origin(self.manifest(), self.condition_id)
 
     def damaged_files(self, config_json: bytes | None = None) -> dict[str, str]:
         """Return name → what is wrong with it, of the files beside the logs, see `check`.
@@ -150,7 +131,7 @@ class RunDirectory:
             damaged[REPLICATES] = "damaged: not a directory"
         checks: dict[str, Callable[[], object]] = {
             CONFIG: self.check,
-            MANIFEST: lambda: checked_manifest(self.path, self.condition_id),
+            MANIFEST: lambda: identity.checked_manifest(self.path, self.condition_id),
             PLANS: self.plans,
         }
         for name, check in checks.items():
@@ -160,8 +141,8 @@ class RunDirectory:
                 if name != MANIFEST or os.path.lexists(self.path / MANIFEST) or self.completed():
                     damaged[name] = reason(self.path / name, error)
         if config_json is None:
-            config_json = b"" if CONFIG in damaged else read(self.path / CONFIG)
-        lost = lost_files(self.path, config_json)
+            config_json = b"" if CONFIG in damaged else identity.read(self.path / CONFIG)
+        lost = identity.lost_files(self.path, config_json)
         return damaged | {str(path.relative_to(self.path)): why for path, why in lost}
 
     @property
@@ -171,11 +152,11 @@ class RunDirectory:
         A manifest out of somebody's archive is not believed: its command is none to be typed.
         """
         try:
-            notes = checked_manifest(self.path, self.condition_id)
+            notes = identity.checked_manifest(self.path, self.condition_id)
             words = shlex.split(str(notes.get("command") or ""))
         except (DamagedFile, ValueError):
             return COMMAND
-        return shlex.join(words) if words[:2] == _RUN and TAKEN not in notes else COMMAND
+        return shlex.join(words) if words[:2] == _RUN and identity.TAKEN not in notes else COMMAND
 
     def plans(self) -> list[Plan]:
         """Return how many replicates were asked for, in the order in which that was done."""
@@ -183,7 +164,7 @@ class RunDirectory:
         if not os.path.lexists(path):
             return []
         try:
-            rows = read_object(path)["plans"]
+            rows = identity.read_object(path)["plans"]
             plans = [Plan(row["num_replicates"], row["stored"]) for row in rows]
         except (KeyError, TypeError) as error:
             raise DamagedFile(f"{path}: damaged: no list of plans") from error
@@ -225,7 +206,7 @@ class RunDirectory:
 
     def failure(self, replicate: int) -> dict[str, Any]:
         """Return `reason` and `traceback` of a failed replicate."""
-        failure = read_object(self.failure_path(replicate))
+        failure = identity.read_object(self.failure_path(replicate))
         if not all(isinstance(failure.get(name), str) for name in ("reason", "traceback")):
             raise StoreError(f"{self.failure_path(replicate)}: damaged: no reason and traceback")
         return failure
@@ -299,7 +280,7 @@ def open_run(outputs: Path, name: str) -> RunDirectory:
     """Return a stored run by its directory's name; StoreError: nothing there knows its hash."""
     path = Path(outputs) / "runs" / name
     try:
-        return RunDirectory(outputs, stored_id(path))
+        return RunDirectory(outputs, identity.stored_id(path))
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror or error}") from error
 

@@ -1,27 +1,32 @@
 """`summary.parquet`: one row per replicate, derived from the logs and always rebuildable.
 
-It notes size and time of every log behind it, and which ones are damaged and have no row.
+It notes size and time of every log behind it, and which ones are damaged and have no row. Data
+frames of summaries and generations are read from such tables and from the logs.
 """
 
 import contextlib
 import errno
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from evoexp.errors import Busy, CorruptLog, StoreError
-from evoexp.records import ReplicateSummary, flatten
+from evoexp.records import GenerationRow, ReplicateSummary, flatten
 from evoexp.store.files import listed, reason, set_aside, warn, write_file
-from evoexp.store.log_bounds import check_sums
-from evoexp.store.log_reader import read_summary
-from evoexp.store.messages import field_types
-from evoexp.store.run_context import ORIGIN, run_context
+from evoexp.store.identity import ORIGIN, run_context
+from evoexp.store.log import field_types
+from evoexp.store.log_reader import DTYPES, check_sums, generation_columns, read_summary
 from evoexp.store.run_directory import RunDirectory
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Runs = RunDirectory | Iterable[RunDirectory]
 Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
@@ -216,7 +221,6 @@ def _up_to_date(
 
 
 def _is_intact(log: Path) -> bool:
-    """Return whether the checksums of a log are right."""
     try:
         check_sums(log.read_bytes(), log.name)
     except (CorruptLog, OSError):
@@ -287,3 +291,58 @@ def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:
         text = f"unknown: {name}: {why}"
     row = {"condition": run.condition_id, "replicate": replicate, "status": "failed"}
     return row | {"stop_reason": text}, why
+
+
+def read_summaries(runs: Runs, *, thorough: bool = False) -> "pd.DataFrame":
+    """Return the summaries of one or several runs, one row per replicate; see `summary_table`.
+
+    Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and missing stay
+    three things; text is pandas' own.
+    """
+    import pandas as pd  # takes long to load
+
+    frame: pd.DataFrame = summary_table(runs, thorough=thorough).to_pandas(
+        types_mapper=lambda kind: None if pa.types.is_string(kind) else pd.ArrowDtype(kind)
+    )
+    return frame
+
+
+def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> "pd.DataFrame":
+    """Return the generations of completed replicates of one or several runs.
+
+    Damaged logs are left out; `read_summaries` says so.
+
+    Returns:
+        Columns condition (categorical), replicate, those of `GenerationRow` without its chain, and
+        `term_<name>` in alphabetical order, NaN where a generation lacks the term.
+    """
+    import pandas as pd
+
+    directories = distinct(runs)
+    codes, indices, parts = list[int](), list[int](), list[dict[str, NDArray[Any]]]()
+    for code, run in enumerate(directories):
+        done = whole_logs(run)
+        for replicate in sorted(done if replicates is None else done.intersection(replicates)):
+            parts.append(generation_columns(run.log_path(replicate)))
+            codes.append(code)
+            indices.append(replicate)
+    heights = [len(part["index"]) for part in parts]
+    categories = pd.Index([run.condition_id for run in directories], dtype="str")
+    frame: dict[str, Any] = {
+        "condition": pd.Categorical.from_codes(
+            np.repeat(np.array(codes, dtype=np.int32), heights), categories
+        ),
+        "replicate": np.repeat(np.array(indices, dtype=np.int64), heights),
+    }
+    fields = field_types(GenerationRow).items()
+    kinds = {name: DTYPES[kind] for name, kind in fields if name != "chain"}
+    terms = {name for part in parts for name in part} - set(kinds)
+    kinds |= dict.fromkeys(sorted(terms), np.float64)
+    # a column leaves the parts when it is in the frame: nothing is there twice
+    for name, kind in kinds.items():
+        pieces = [
+            part.pop(name) if name in part else np.full(height, np.nan)
+            for part, height in zip(parts, heights, strict=True)
+        ]
+        frame[name] = np.concatenate([np.empty(0, dtype=kind), *pieces])
+    return pd.DataFrame(frame, copy=False)

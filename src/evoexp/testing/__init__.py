@@ -20,8 +20,15 @@ operator must do, and what this one did.
 import evoexp.testing.solution_checks  # noqa: F401  # adds its checks
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.testing.contract import CHECKS, Check, ContractBroken
-from evoexp.testing.operator_checks import check_operator, crossed, mutated, selected
+from evoexp.testing.contract import (
+    CHECKS,
+    Check,
+    ContractBroken,
+    check_operator,
+    crossed,
+    mutated,
+    selected,
+)
 
 __all__ = [
     "CHECKS",

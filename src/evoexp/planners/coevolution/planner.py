@@ -37,7 +37,7 @@ from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, nu
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.scenarios.link_motion import LinkMotion
+from evoexp.scenarios.motion_tasks import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
 REFUSED = (

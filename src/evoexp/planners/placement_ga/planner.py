@@ -32,7 +32,7 @@ from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
-from evoexp.scenarios.docking import Docking
+from evoexp.scenarios.motion_tasks import Docking
 from evoexp.validation import Component, Limits
 
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man

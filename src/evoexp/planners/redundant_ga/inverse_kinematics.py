@@ -18,7 +18,7 @@ from evoexp.planners.redundant_ga.sub_path import DrawnSearch
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import PlanarArm, bring_tip_to
-from evoexp.scenarios.pick_and_place import PickAndPlace
+from evoexp.scenarios.motion_tasks import PickAndPlace
 
 
 @kernel

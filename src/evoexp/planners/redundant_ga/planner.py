@@ -30,7 +30,7 @@ from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, Se
 from evoexp.planners.redundant_ga.sub_path import TERMS, Search
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.scenarios.pick_and_place import PickAndPlace
+from evoexp.scenarios.motion_tasks import PickAndPlace
 from evoexp.validation import Component, Count, Positive
 
 CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellipses.Contact`

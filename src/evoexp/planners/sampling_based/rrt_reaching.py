@@ -27,7 +27,7 @@ from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath, TreePa
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import bring_tip_to, tip
-from evoexp.scenarios.pick_and_place import PickAndPlace
+from evoexp.scenarios.motion_tasks import PickAndPlace
 from evoexp.validation import Component, Count, NonNegativeCount, Positive
 
 CLOSE = 1e-6  # [-] of the arm's length, by which the tip may miss a place

@@ -25,7 +25,7 @@ from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Best, Block, FloatArray
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
-from evoexp.scenarios.mission import Mission
+from evoexp.scenarios.motion_tasks import Mission
 from evoexp.validation import Component
 
 ANGLES = 2

@@ -15,8 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from evoexp.playback.colours import OBJECT, OBSTACLE
-from evoexp.playback.recording import Recording
-from evoexp.playback.shapes import Outline, Shape
+from evoexp.playback.recording import Outline, Recording, Shape
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, records, rounded, style, surfaces
 

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.playback.shapes import Outline
+from evoexp.playback.recording import Outline
 from evoexp.records import FloatArray
 
 AROUND, ALONG = 14, 4  # pieces of a round surface around its axis, and of each of its ends

@@ -25,7 +25,7 @@ from evoexp.errors import SettingError, UnknownSetting, nearest
 from evoexp.report.pages import GENERIC, markdown, page_values
 from evoexp.report.results import run_measures
 from evoexp.report.statistics.judging import NO_RULES, Rules, read_rules
-from evoexp.store.messages import TERM
+from evoexp.store.log import TERM
 
 CONDITION = "condition"  # the item that columns of summaries belong to
 COLUMNS = (  # of summaries, which pages may name beside the planner's own terms

@@ -15,7 +15,7 @@ from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
-from evoexp.store.messages import TERM
+from evoexp.store.log import TERM
 
 FEW = 4  # conditions whose average costs can be drawn beside the best ones
 

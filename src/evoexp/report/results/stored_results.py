@@ -23,8 +23,7 @@ from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
 from evoexp.store.log_reader import read_log, read_solution
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.summaries import damaged_logs
-from evoexp.store.tables import read_generations, read_summaries
+from evoexp.store.summaries import damaged_logs, read_generations, read_summaries
 
 Kind = TypeVar("Kind")
 # the field of a control (random search) that holds the planner it stands beside

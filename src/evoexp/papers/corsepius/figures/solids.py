@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from evoexp.papers import trails
 from evoexp.planners.posture_es.phases import Problem
-from evoexp.playback.shapes import outline
+from evoexp.playback.recording import outline
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, records, rounded, style, surfaces
 from evoexp.report.results.stored_results import ConditionResults

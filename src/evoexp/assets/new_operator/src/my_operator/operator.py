@@ -27,11 +27,8 @@ class MyOperator(Crossover):
         copy_parents(genomes, parents, out)
         num_genes, share = len(genomes), context.settings[0]
         for pair in range(len(parents) // 2):
-            draws, first, second = (
-                context.uniforms[pair * (1 + num_genes) :],
-                2 * pair,
-                2 * pair + 1,
-            )
+            draws = context.uniforms[pair * (1 + num_genes) :]
+            first, second = 2 * pair, 2 * pair + 1
             if draws[0] < context.rate:
                 for gene in range(num_genes):
                     if draws[1 + gene] < share:

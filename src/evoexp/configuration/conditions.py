@@ -7,7 +7,6 @@ A folder of problems as MoveIt writes them, `scenario.folder=…`, gives a condi
 `scene0001.yaml` beside a `request0001.yaml`, or folders of these, as MotionBenchMaker has them.
 """
 
-import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -77,14 +76,7 @@ class Builder:
                 if row in named:
                     raise
         groups = [(same, self._built(same[0].choice)) for same in members.values()]
-
-        def is_same(row: Crossed, choice: Choice) -> bool:
-            """Return whether another choice gives the same condition."""
-            with contextlib.suppress(EvoexpError):
-                return self._built(choice).condition.id == self._built(row.choice).condition.id
-            return False
-
-        labels = labels_of(groups, is_same)
+        labels = labels_of(groups)
         picked = rejoined(only, known := {*labels, *names})
         if unknown := [label for label in picked if label not in known]:
             raise UnknownOption("--only", unknown[0], known)

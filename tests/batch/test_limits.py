@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.batch import memory_limit
-from evoexp.batch.memory_limit import allowed_memory, machine_memory, refuse_large
+from evoexp.batch import runner_settings
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.batch.reproduction import reproduce_log
 from evoexp.batch.runner import Batch
-from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.batch.runner_settings import (
+    RunnerSettings,
+    allowed_memory,
+    machine_memory,
+    refuse_large,
+)
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.records import Generation, blocks
@@ -63,7 +67,7 @@ def test_the_setting_raises_and_lowers_the_limit(tmp_path: Path) -> None:
 
 
 def test_workers_share_the_memory_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory_limit, "machine_memory", lambda: 8e9)
+    monkeypatch.setattr(runner_settings, "machine_memory", lambda: 8e9)
     assert allowed_memory(RunnerSettings(num_workers=None), 4) == 2e9
     assert allowed_memory(RunnerSettings(num_workers=4, memory_gb=3.0), 4) == 3e9
 
@@ -72,7 +76,7 @@ def test_a_container_has_less_memory_than_its_machine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole, path = machine_memory(), tmp_path / "memory.max"
-    monkeypatch.setattr(memory_limit, "_CONTAINER", path)
+    monkeypatch.setattr(runner_settings, "_CONTAINER", path)
     path.write_text("123456789\n")
     assert machine_memory() == 123456789
     path.write_text("max\n")

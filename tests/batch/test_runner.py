@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 import evoexp.batch.jobs as jobs_module
 from evoexp.batch import live_curves
-from evoexp.batch.fan_out import MAX_BUNDLE, Replicates
 from evoexp.batch.jobs import (
+    MAX_BUNDLE,
     NO_LIMITS,
     Job,
     Outcome,
+    Replicates,
     warm_kernels,
 )
 from evoexp.batch.live_curves import read_curves

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from evoexp.attachments import mesh_content, package_folders
 from evoexp.errors import SettingError
-from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.testing import conditions
 from robots.robot_samples import REACH
 

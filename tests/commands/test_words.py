@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_samples import Evoexp
 
-from evoexp.commands.arguments import is_motion, is_override
+from evoexp.commands.command_parser import is_motion, is_override
 
 PLANAR = ("experiment=rana_planar", "budget=smoke")
 

@@ -13,10 +13,9 @@ from omegaconf import OmegaConf
 
 from evoexp import shipped
 from evoexp.configuration import compose
-from evoexp.configuration.assignment import assigned
 from evoexp.configuration.compose import expand
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.overrides import collect
+from evoexp.configuration.overrides import assigned, collect
 from evoexp.configuration.search_path import find
 from evoexp.errors import SettingError
 from shipped_conditions import expanded

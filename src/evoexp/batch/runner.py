@@ -119,7 +119,6 @@ class Batch:
         return Workers(self.num_workers)
 
     def _outcomes(self, workers: Workers | None) -> Iterator[list[Outcome]]:
-        """Load the kernels, then run the jobs where the settings say."""
         allowed = allowed_memory(self._settings, self.num_workers)
         least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
         limits = ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))

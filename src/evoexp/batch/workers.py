@@ -56,8 +56,6 @@ class Died(NamedTuple):
 
 @dataclass(eq=False)
 class _Worker:
-    """One worker process."""
-
     pipe: Connection
     process: int | None = None  # its number; None before its first message
     task: tuple[Any, ...] | None = None  # the arguments of what it is doing; None: nothing
@@ -160,7 +158,6 @@ class Workers:
         self._fill()
 
     def _fill(self) -> None:
-        """Start workers until they are as many as they should be."""
         while len(self._workers) < self.number:
             ours, theirs = Pipe()
             self._workers[ours] = _Worker(ours)

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import option_words
+from evoexp.commands.command_parser import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.list_ import run_row, run_table
 from evoexp.commands.progress import BatchProgress
@@ -42,20 +42,16 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         print(USAGE.format(number=len(options("experiment"))), file=sys.stderr)
         return 2
-    multirun, only = arguments.multirun, arguments.only
-    experiments = compose.expand(arguments.overrides, multirun=multirun, only=only)
+    experiments = compose.expand(
+        arguments.overrides, multirun=arguments.multirun, only=arguments.only
+    )
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    words = [*arguments.overrides, *option_words(multirun, only, arguments.config_dir)]
-    command = shlex.join(["evoexp", "run", *words])
+    command = shlex.join(["evoexp", "run", *arguments.overrides, *option_words(arguments)])
     wanted = [
-        (
-            labelled.condition,
-            labelled.condition.num_replicates(experiment.num_replicates),
-            experiment.origin(labelled.label, command),
-        )
+        (each, each.num_replicates(experiment.num_replicates), experiment.origin(label, command))
         for experiment in experiments
-        for labelled in _that_can_run(experiment)
+        for label, each in _that_can_run(experiment)
     ]
     runner = experiments[0].runner
     if arguments.live and runner.backend != "loky":
@@ -96,7 +92,6 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
 def _run(
     batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
 ) -> list[Outcome]:
-    """Run what is missing; return the replicates that failed."""
     if not batch.jobs:
         if batch.is_damaged:
             deque(batch.run(), maxlen=0)  # mends what is no replicate
@@ -133,8 +128,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
 
     def drawn(experiment: Experiment) -> str:
         say(summary_table(experiment))
-        again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
-        asked = arguments.overrides, again
+        asked = arguments.overrides, option_words(arguments)
         directory = outputs_root() / "reports" / experiment.report_name
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):

@@ -13,16 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evoexp.batch.jobs as jobs_module
-from evoexp.batch import live_curves
 from evoexp.batch.jobs import (
     MAX_BUNDLE,
     NO_LIMITS,
     Job,
     Outcome,
     Replicates,
+    read_curves,
     warm_kernels,
 )
-from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import BUDGET_SPENT, run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.cli import main
@@ -113,7 +112,7 @@ def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
 def test_a_batch_tells_how_its_replicates_converge(
     faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
+    monkeypatch.setattr(jobs_module, "INTERVAL_S", 0.0)
     (tmp_path / "curves").mkdir()
     run(tmp_path / "outputs", (faulty, 1), curves=tmp_path / "curves")
     (curve,) = read_curves(tmp_path / "curves")

@@ -17,10 +17,9 @@ import pytest
 from command_samples import SERIAL, Evoexp, content, exit_code
 from rich.console import Console
 
+import evoexp.batch.jobs as jobs_module
 from evoexp import load
-from evoexp.batch import live_curves
-from evoexp.batch.jobs import Outcome
-from evoexp.batch.live_curves import NUM_POINTS, CurveFile, read_curves
+from evoexp.batch.jobs import NUM_POINTS, CurveFile, Outcome, read_curves
 from evoexp.commands.run import MOST_ROWS, BatchProgress, drawn
 from evoexp.configuration import compose
 from evoexp.records import Block, Generation
@@ -268,7 +267,7 @@ def test_of_many_conditions_the_last_ones_are_shown() -> None:
 @pytest.fixture
 def heard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Return what has a worker leave a curve of best costs."""
-    monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
+    monkeypatch.setattr(jobs_module, "INTERVAL_S", 0.0)
     file, best = CurveFile(tmp_path, "b", 1), np.zeros(1)
 
     def hear(costs: Iterable[float]) -> None:

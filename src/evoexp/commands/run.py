@@ -19,8 +19,7 @@ from rich import progress
 from rich.console import Console, RenderableType
 from rich.table import Table
 
-from evoexp.batch.jobs import Outcome
-from evoexp.batch.live_curves import Curve, read_curves
+from evoexp.batch.jobs import Curve, Outcome, read_curves
 from evoexp.batch.runner import Batch
 from evoexp.commands.command_parser import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each

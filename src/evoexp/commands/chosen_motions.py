@@ -9,7 +9,6 @@ import numpy as np
 
 from evoexp.batch.reproduction import stored_condition
 from evoexp.commands.command_parser import is_motion, is_override
-from evoexp.commands.console import say
 from evoexp.commands.motion_files import fitting_motions
 from evoexp.commands.stored_runs import finished_replicate, stored_run
 from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
@@ -153,6 +152,7 @@ def play(arguments: argparse.Namespace) -> int:
 
 def export(arguments: argparse.Namespace) -> int:
     """Write a motion as a joint trajectory, for a robot or MoveIt."""
+    from evoexp.commands.console import say
     from evoexp.playback.joint_limits import joint_limits
     from evoexp.playback.trajectory import as_csv, as_json, as_ros, trajectory  # and scipy
 

@@ -1,41 +1,35 @@
-"""`evoexp report` and `site`: figures, tables, verdicts and the home page, from outputs alone."""
+"""`evoexp report`: figures, tables and verdicts again, from the outputs alone."""
 
 import argparse
 import contextlib
 import functools
 import hashlib
-import importlib
 import io
 import itertools
 import re
 import shlex
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from evoexp.commands import site
 from evoexp.commands.command_parser import command_parser, is_override, option_words
 from evoexp.commands.console import say, say_each
-from evoexp.commands.stored_runs import stored_runs, unpacked
+from evoexp.commands.stored_runs import unpacked
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError, UnknownOption
-from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages import build
-from evoexp.report.pages.home_page import Paper, StoredRun, home_page, summaries
-from evoexp.report.pages.html_page import HTML
+from evoexp.report.pages.home_page import summaries
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.statistics.claim_rules import registered_rules
 from evoexp.shipped import shipped
-from evoexp.store.files import write_file
-from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
 PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
-ALL_CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
-MAX_NAMED = 4  # runs that a report's name spells out, or that are named as being written
+CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
+MAX_NAMED = 4  # runs whose hashes a report's name spells out
 _HASH = re.compile("[0-9a-fA-F]{4,64}")
 _SILENT = ("experiment", "budget", "runner")  # overrides that a report's command need not repeat
 
@@ -63,7 +57,7 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         raise SettingError("experiment", "named, or --all given", "none")
     arguments.overrides = unpacked(arguments.overrides)
-    if ALL_CLAIMS in arguments.overrides:
+    if CLAIMS in arguments.overrides:
         arguments.overrides = _with_claims(arguments.overrides)
     found = requests(arguments)
     if arguments.check:
@@ -83,11 +77,11 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
     failed: list[str] = []
     reports = _drawn(planned, failed)
     if arguments.check:
-        code = _check(itertools.chain(reports, (home_files() for _ in range(1))))
+        code = _check(itertools.chain(reports, (site.home_files() for _ in range(1))))
         return 1 if failed else code
     for report in reports:
         say(f"report: {build.write_report(report)}")
-    site(arguments)
+    site.main(arguments)
     return 1 if failed else 0
 
 
@@ -117,7 +111,7 @@ def _check(reports: Iterable[build.ReportFiles]) -> int:
 
 def _with_claims(words: Sequence[str]) -> list[str]:
     """Return the words with `claims` replaced by the papers' experiments that are stored."""
-    every = [name for name in options("experiment") if name.endswith(f"_{ALL_CLAIMS}")]
+    every = [name for name in options("experiment") if name.endswith(f"_{CLAIMS}")]
     table, outputs = shipped(), outputs_root()
     ids = {name: {r.condition_id for r in table if r.experiment == name} for name in every}
     stored = [
@@ -125,10 +119,10 @@ def _with_claims(words: Sequence[str]) -> list[str]:
     ]
     missing = " ".join(f"evoexp run experiment={name};" for name in every if name not in stored)
     if not stored:
-        raise NothingStored(f"{ALL_CLAIMS}: nothing stored in {outputs}; try: {missing[:-1]}")
+        raise NothingStored(f"{CLAIMS}: nothing stored in {outputs}; try: {missing[:-1]}")
     if missing:
         say(f"nothing stored yet: {missing[:-1]}")
-    return [name for word in words for name in (stored if word == ALL_CLAIMS else [word])]
+    return [name for word in words for name in (stored if word == CLAIMS else [word])]
 
 
 # what is asked for
@@ -298,69 +292,3 @@ def _again(folder: str, command: str) -> build.ReportFiles:
         if len(found) != 1:
             raise no_command
         return found[0].files()
-
-
-# the home page
-
-
-def site(arguments: argparse.Namespace) -> int:
-    """Write the home page of all reports, and name it."""
-    directory, files = home_files()
-    directory.mkdir(parents=True, exist_ok=True)
-    write_file(directory / HTML, files[HTML])
-    say(f"site: {directory / HTML}")
-    # unfinished runs that another process is writing now
-    busy = [
-        name
-        for name, run in stored_runs(outputs_root())
-        if isinstance(run, RunDirectory)
-        and run.num_planned() > len(run.completed())
-        and run.is_being_written()
-    ]
-    if busy:
-        more = ", …" if len(busy) > MAX_NAMED else ""
-        which = "runs are" if len(busy) > 1 else "run is"
-        say(
-            f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
-            "their results are partial"
-        )
-    return 0
-
-
-def home_files() -> build.ReportFiles:
-    """Return the home page as it follows from the reports and runs that are there."""
-    outputs = outputs_root()
-    found, runs = summaries(outputs / "reports"), list[StoredRun]()
-    for name, run in stored_runs(outputs):
-        if isinstance(run, EvoexpError):
-            runs.append(StoredRun(name, "", "", "", 0, 0, 0, str(run)))
-            continue
-        origin = origin_of(run)
-        experiment, label, budget = (str(origin[key] or "") for key in ORIGIN)
-        budget += ", changed" * bool(budget and origin["changed"])
-        counts = len(run.completed()), run.num_planned(), len(run.failed())
-        runs.append(StoredRun(name, experiment, label, budget, *counts))
-    if not found and not runs:
-        raise NothingStored(
-            f"site: nothing stored in {outputs}; try: evoexp run experiment=rana_planar"
-        )
-    runs.sort(key=lambda run: (run.experiment, run.budget, run.label, run.hash12))
-    return build.ReportFiles(outputs / "reports", {HTML: home_page(found, papers(), runs)})
-
-
-def papers() -> list[Paper]:
-    """Return the papers that packages register claims of, the oldest first.
-
-    The title of a paper is the first sentence of its package.
-    """
-    found = []
-    for name in names(CLAIMS):
-        registration = registered(CLAIMS, name)
-        assert registration is not None
-        rules = registered_rules(registration).values()
-        module = importlib.import_module(registration.module)
-        text = importlib.import_module(module.__package__ or module.__name__).__doc__ or name
-        title, _, subtitle = text.strip().partition("\n")[0].rstrip(".").partition(": ")
-        claims = Counter(experiment for rule in rules for experiment in rule.experiments)
-        found.append(Paper(name, title, subtitle, tuple(options("experiment")), claims))
-    return sorted(found, key=lambda paper: (paper.title[-4:], paper.title))

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from evoexp import shipped
 from evoexp.commands.command_parser import is_override
-from evoexp.commands.console import say
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from evoexp.errors import AmbiguousHash, EvoexpError, NothingStored, UnknownHash, printable
@@ -88,6 +87,8 @@ def shipped_experiment(row: Shipped) -> Experiment:
 
 def pack(arguments: argparse.Namespace) -> int:
     """Write stored runs as one file, which other commands accept elsewhere."""
+    from evoexp.commands.console import say  # and rich
+
     runs = {run.condition_id: run for run in map(stored_run, arguments.hashes)}
     for run in runs.values():
         if not run.completed():
@@ -138,6 +139,8 @@ def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
 
 def unpacked(words: Sequence[str]) -> list[str]:
     """Take archives among words into the store; return the hashes of their runs in their place."""
+    from evoexp.commands.console import say
+
     found: list[str] = []
     for word in words:
         if not is_archive(word):

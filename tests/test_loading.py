@@ -67,8 +67,8 @@ def test_a_sweep_gives_what_is_stored_of_it(outputs: Path) -> None:
 
 def test_conditions_that_become_one_have_its_rows_once(outputs: Path) -> None:
     generations, summaries = loaded(outputs, *SMALL, "control=null")
-    assert summaries["label"].tolist() == ["via-point GA"] * 2
-    assert generations["label"].tolist() == ["via-point GA"] * 6
+    assert summaries["label"].tolist() == ["control=null"] * 2
+    assert generations["label"].tolist() == ["control=null"] * 6
 
 
 def test_what_cannot_be_loaded(outputs: Path, tmp_path: Path) -> None:

@@ -10,9 +10,11 @@ import os
 import sys
 from collections.abc import Sequence
 
-from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
+from evoexp.commands.command_parser import COMMANDS, command_function, command_parser, whole_parser
 from evoexp.commands.command_process import (
     OUTPUT,
+    Interrupted,
+    Interruption,
     complain,
     damage_in_lines,
     memory_shortage,
@@ -21,7 +23,6 @@ from evoexp.commands.command_process import (
     settle_streams,
     use_temporary_folder,
 )
-from evoexp.commands.interruption import Interrupted, Interruption
 from evoexp.errors import EvoexpError
 
 KEPT = "finished replicates are kept, the same command runs the others"
@@ -58,7 +59,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: Sequence[str], is_process: bool) -> int:
-    """Run one command; return its exit code."""
     if not words or words[0] not in COMMANDS:
         parser, _ = whole_parser()
         parser.parse_args(words)
@@ -75,7 +75,7 @@ def _run(words: Sequence[str], is_process: bool) -> int:
 
             stack.enter_context(searched_first(folders))
         stack.enter_context(damage_in_lines())
-        return int(command_module(chosen).main(given))
+        return int(command_function(chosen)(given))
 
 
 def _explain(error: BaseException, words: Sequence[str], interruption: Interruption) -> int:

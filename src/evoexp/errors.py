@@ -41,12 +41,13 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean '{brief(matches[0], _SHOWN)}'?" if matches else ""
 
 
-def listed_names(known: Sequence[str], name: str) -> str:
-    """Return all known names where they are few, else those nearest to a name, and their number."""
-    if len(known) <= _MOST_NAMES:
-        return ", ".join(known) or "none"
-    near = difflib.get_close_matches(name, known, n=_NEAREST, cutoff=0.0)
-    return f"{', '.join(near)}, … {len(known)} in all"
+def _choices(heading: str, known: Sequence[str], name: str) -> str:
+    """Name the known name nearest to one, and all where they are few, else some near ones."""
+    listed = ", ".join(known) or "none"
+    if len(known) > _MOST_NAMES:
+        near = difflib.get_close_matches(name, known, n=_NEAREST, cutoff=0.0)
+        listed = f"{', '.join(near)}, … {len(known)} in all"
+    return f"{nearest(name, known)} ({heading}: {listed})"
 
 
 class SettingError(EvoexpError):
@@ -77,26 +78,17 @@ class UnknownSetting(EvoexpError):
     """A key that no component has; names the nearest, and lists them where they are few."""
 
     def __init__(self, field: str, known: Iterable[str]) -> None:
-        self.field = field
-        self.known = sorted(known)
-        last = field.rsplit(".", 1)[-1]
-        super().__init__(
-            f"{field}: unknown setting{nearest(last, self.known)} (known here: "
-            f"{listed_names(self.known, last)})"
-        )
+        self.field, self.known = field, sorted(known)
+        choices = _choices("known here", self.known, field.rsplit(".", 1)[-1])
+        super().__init__(f"{field}: unknown setting{choices}")
 
 
 class UnknownOption(EvoexpError):
     """A name that is no option of its kind (experiment, robot, planner, …); names the nearest."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
-        self.kind = kind
-        self.name = name
-        self.known = sorted(known)
-        super().__init__(
-            f"{kind}: no option '{name}'{nearest(name, self.known)} (options: "
-            f"{listed_names(self.known, name)})"
-        )
+        self.kind, self.name, self.known = kind, name, sorted(known)
+        super().__init__(f"{kind}: no option '{name}'{_choices('options', self.known, name)}")
 
 
 class RegistrationError(EvoexpError):

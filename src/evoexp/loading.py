@@ -42,7 +42,6 @@ class Frames(NamedTuple):
         return "\n".join([", ".join(sizes), *rows])
 
     def _repr_html_(self) -> str:
-        """Return the conditions with medians, for a notebook."""
         groups = self.summaries.groupby(["label", "condition"], sort=False)
         table = groups.agg(
             replicates=("replicate", "size"),

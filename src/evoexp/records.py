@@ -18,6 +18,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
+# column of a `Block` → field of a `Generation`
+COLUMNS = {"lowest": "best_cost_in_generation", "means": "mean_cost", "deviations": "std_cost"}
+COLUMNS |= {name: name for name in ("num_feasible", "evaluations", "collision_queries")}
 # fields of a summary that no two runs of a replicate share [s]
 TIMES = ("certificate_s", "cpu_s", "wall_s")
 
@@ -92,12 +95,7 @@ class Block(NamedTuple):
         return cls(
             first=g.index,
             bests=[Best(0, g.best, g.best_cost, dict(g.terms), g.solved)],
-            lowest=[g.best_cost_in_generation],
-            means=[g.mean_cost],
-            deviations=[g.std_cost],
-            num_feasible=[g.num_feasible],
-            evaluations=[g.evaluations],
-            collision_queries=[g.collision_queries],
+            **{column: [getattr(g, name)] for column, name in COLUMNS.items()},
             costs=g.costs[None],
             population=lambda place: g.population,
             states=[g.state] if g.state else None,
@@ -132,13 +130,7 @@ class Block(NamedTuple):
         self.population(count)
         return self._replace(
             bests=[best for best in self.bests if best.place < count],
-            lowest=self.lowest[:count],
-            means=self.means[:count],
-            deviations=self.deviations[:count],
-            num_feasible=self.num_feasible[:count],
-            evaluations=self.evaluations[:count],
-            collision_queries=self.collision_queries[:count],
-            costs=self.costs[:count],
+            **{column: getattr(self, column)[:count] for column in (*COLUMNS, "costs")},
             population=lambda place: population,
             states=None if self.states is None else self.states[:count],
             criteria=None,
@@ -154,12 +146,7 @@ class Block(NamedTuple):
                 index=self.first + k,
                 best=best.solution,
                 best_cost=best.cost,
-                best_cost_in_generation=self.lowest[k],
-                mean_cost=self.means[k],
-                std_cost=self.deviations[k],
-                num_feasible=self.num_feasible[k],
-                evaluations=self.evaluations[k],
-                collision_queries=self.collision_queries[k],
+                **{name: getattr(self, column)[k] for column, name in COLUMNS.items()},
                 solved=best.solved,
                 terms=best.terms,
                 costs=self.costs[k],

@@ -187,7 +187,6 @@ def _settings_error(
 
 
 def _members(value: Any) -> Mapping[str, Any]:
-    """Return the settings in a value, none if it has none."""
     if isinstance(value, Settings):
         return vars(value)
     return value if isinstance(value, Mapping) else {}
@@ -209,7 +208,6 @@ def _inner(kinds: set[type[Settings]], part: int | str) -> set[type[Settings]]:
 
 
 def _settings_in(annotation: Any) -> Iterator[type[Settings]]:
-    """Yield the classes of settings in the type of a field."""
     if isinstance(annotation, type) and issubclass(annotation, Settings):
         yield annotation
     for inner in get_args(annotation):

@@ -23,7 +23,7 @@ from batch_samples import WORDS, around_plug_in, digests, run
 from process_table import PATIENCE_S, eventually, of_group
 
 from evoexp.cli import KEPT
-from evoexp.commands.interruption import Interrupted, Interruption
+from evoexp.commands.command_process import Interrupted, Interruption
 from evoexp.condition import Condition
 from evoexp.errors import Busy
 from evoexp.store.run_directory import RunDirectory
@@ -245,7 +245,7 @@ def test_cleaning_up_is_not_interrupted(heard: Interruption) -> None:
 COMMANDS = """
 import os, signal, sys, threading, time
 from evoexp import cli
-from evoexp.commands import interruption
+from evoexp.commands import command_process
 
 def leave_threads(words):
     threading.Thread(target=threading.Event().wait).start()  # whom nobody will tell anything
@@ -275,11 +275,11 @@ def interrupt(words):
     time.sleep(60)
 
 def run(command):
-    cli.command_module = lambda name: type("", (), {"main": command})
+    cli.command_function = lambda name: command
     sys.exit(cli.main())
 
 def close_for_ever():
-    interruption.Interruption().hear()
+    command_process.Interruption().hear()
     try:
         signal.raise_signal(signal.SIGINT)
     finally:
@@ -287,7 +287,7 @@ def close_for_ever():
 
 def ignore():
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    interruption.Interruption().hear()
+    command_process.Interruption().hear()
     signal.raise_signal(signal.SIGHUP)
 """
 
@@ -295,14 +295,14 @@ def ignore():
 @pytest.mark.parametrize(
     ("code", "returncode", "complaint"),
     [
-        ("interruption.ENDING_S = 0.5; run(leave_threads)", -2, "evoexp: interrupted\n"),
+        ("command_process.ENDING_S = 0.5; run(leave_threads)", -2, "evoexp: interrupted\n"),
         (
-            "interruption.ENDING_S = 0.3; kept = Slow(); run(interrupt)",
+            "command_process.ENDING_S = 0.3; kept = Slow(); run(interrupt)",
             130,
             "evoexp: interrupted\n",
         ),
-        ("interruption.PATIENCE_S = 0.5; run(wait_for_ever)", 143, "evoexp: interrupted\n"),
-        ("interruption.CLOSING_S = 0.5; close_for_ever()", -2, ""),
+        ("command_process.PATIENCE_S = 0.5; run(wait_for_ever)", 143, "evoexp: interrupted\n"),
+        ("command_process.CLOSING_S = 0.5; close_for_ever()", -2, ""),
         ("ignore()", 0, ""),  # a signal that the process was started to ignore
     ],
 )

@@ -1,10 +1,12 @@
 """Workers share nothing, are replaced when they die, and end with whoever started them."""
 
 import os
+import random
 import signal
 import sys
 import threading
 import time
+from collections import deque
 from pathlib import Path
 from subprocess import PIPE, Popen
 from typing import Any
@@ -13,8 +15,20 @@ import pytest
 from process_table import PATIENCE_S, are_gone, processes
 
 from evoexp.batch import workers as workers_module
-from evoexp.batch.workers import DIED_TWICE, WorkerError, Workers, in_order
-from worker_tasks import end, end_once, fork_and_die, refuse
+from evoexp.batch.workers import DIED_TWICE, Died, WorkerError, Workers, in_order
+from matrix import counts
+from worker_tasks import (
+    LEAST,
+    MEGABYTE,
+    MOST,
+    Struck,
+    content,
+    end,
+    end_once,
+    fork_and_die,
+    refuse,
+    work,
+)
 
 
 def test_results_come_in_order_and_each_task_is_done_once() -> None:
@@ -122,7 +136,7 @@ def command(words):
         list(in_order(workers, time.sleep, [(3600,)] * 2))
     return 0
 
-cli.command_module = lambda name: type("", (), {"main": command})
+cli.command_function = lambda name: command
 sys.exit(cli.main())
 """
 
@@ -142,3 +156,68 @@ def test_workers_end_with_their_parent_whatever_they_do(name: str) -> None:
     else:
         assert (returncode, complaint) == (-number, "")
     assert are_gone(*group)
+
+
+# A worker may be killed at any moment, while it sends its result, too: every batch ends
+
+SEED = 39
+NUM_KILLS = counts(20, 300)
+SPEED = 200 * MEGABYTE  # [B/s] about that of hashing and sending on a busy machine
+PER_BATCH = 10  # kills
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+
+
+def struck(rng: random.Random, number: int, folder: Path) -> Struck:
+    size = round(LEAST * (MOST / LEAST) ** rng.random())
+    delay_s = rng.uniform(0.0, 1.5 * size / SPEED + 0.002) if rng.random() < 0.9 else None
+    return Struck(number, size, delay_s, folder / str(number))
+
+
+class Retried:
+    """Tasks that are done until they end: a late kill may hit the next task of its worker, too."""
+
+    def __init__(self, tasks: list[Struck]) -> None:
+        self._waiting = deque(tasks)
+        self.num_deaths = 0
+
+    def next_task(self, num_running: int) -> tuple[Struck] | None:
+        return (self._waiting.popleft(),) if self._waiting else None
+
+    def end_task(self, task: tuple[Struck], end: Any) -> Any | None:
+        if isinstance(end, Died):
+            self.num_deaths += 1
+            self._waiting.append(task[0])
+            return None
+        return end
+
+
+@pytest.mark.matrix
+def test_every_batch_ends_and_nothing_differs(tmp_path: Path) -> None:
+    rng, number, num_deaths = random.Random(SEED), 0, 0
+    while num_deaths < NUM_KILLS:
+        tasks = [struck(rng, number + k, tmp_path) for k in range(PER_BATCH)]
+        number += PER_BATCH
+        retried = Retried(tasks)
+        with Workers(2) as workers:
+            ended = sorted(workers.results(work, retried.next_task, retried.end_task))
+        assert [place for place, _, _ in ended] == [task.number for task in tasks]
+        for task, (_, computed, _) in zip(tasks, ended, strict=True):
+            assert computed == content(task.number, task.size), task
+        num_deaths += retried.num_deaths
+
+
+def test_half_a_message_keeps_nobody_waiting() -> None:
+    """A worker is killed while it sends a result that nobody reads yet."""
+    tasks = [Struck(0, 1, None, None), Struck(1, 20 * MEGABYTE, None, None)]
+    retried = Retried(tasks)
+    with Workers(2) as workers:
+        results = workers.results(work, retried.next_task, retried.end_task)
+        ended = [next(results)]
+        time.sleep(2.0)  # the other one fills its pipe
+        servers = [each.number for each in processes() if each.parent == os.getpid()]
+        for worker in (each.number for each in processes() if each.parent in servers):
+            os.kill(worker, signal.SIGKILL)
+        ended += results
+    assert retried.num_deaths >= 1  # the idle one is killed, too, and noticed late
+    assert [computed for _, computed, _ in ended] == [content(k, tasks[k].size) for k in (0, 1)]

@@ -45,7 +45,7 @@ def test_a_condition_of_two_experiments_is_one_row(evoexp: Evoexp, stored: Path)
     words = (*SERIAL, "scenario=rana_planar", "control=null", "--json")
     said = evoexp("compare", "rana_planar", "rana_obstacles", *words)
     (row,) = json.loads(said.out)
-    assert row["condition"] == "rana_planar: via-point GA ≡ rana_obstacles: rana_obstacles"
+    assert row["condition"] == "rana_planar: control=null ≡ rana_obstacles: rana_obstacles"
 
 
 def test_given_runs_stand_beside_ours(evoexp: Evoexp, stored: Path, tmp_path: Path) -> None:

@@ -154,7 +154,6 @@ def test_the_texts_of_an_archive_are_shown_as_its_own(
         ("evoexp run 'experiment=x", "evoexp run experiment=…"),
         ("evoexp run `id` $(id) | sh", "evoexp run '`id`' '$(id)' '|' sh"),
         ("evoexp run x\nrm -rf ~", "evoexp run experiment=…"),
-        ("evoexp run x\x1b[2J", "evoexp run experiment=…"),
         (["evoexp", "run"], "evoexp run experiment=…"),
     ],
 )
@@ -169,7 +168,6 @@ def test_a_command_of_a_manifest_is_one_command(
     "entries",
     [
         {"label": "a\nb"},
-        {"label": "a\x1b[31mb"},
         {"label": "a\u202eb"},
         {"experiment": 7},
         {"options": ["a"]},

@@ -111,9 +111,14 @@ def test_every_damage_is_found_and_mended_by_the_command_it_names(
     assert evoexp("verify").code == 0
 
 
-def test_a_whole_store(evoexp: Evoexp, run: RunDirectory) -> None:
+def test_a_whole_store_and_none(
+    evoexp: Evoexp, run: RunDirectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert evoexp("verify") == (0, "3 runs, 6 logs: all is well\n", "")
     assert evoexp("verify", run.hash12[:5]) == (0, "1 runs, 2 logs: all is well\n", "")
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "none"))
+    assert evoexp("verify").out == "0 runs, 0 logs: all is well\n"
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_log_that_is_gone_is_missed(evoexp: Evoexp, run: RunDirectory) -> None:
@@ -187,11 +192,6 @@ def test_large_stores_are_checked_by_workers(
     found = {each["hash"]: each["problems"] for each in json.loads(said.out)}
     assert [len(problems) for problems in found.values()].count(0) == 2
     assert found[run.hash12]["0001.mcap"].startswith("altered")
-
-
-def test_an_empty_store(evoexp: Evoexp, outputs: Path) -> None:
-    assert evoexp("verify").out == "0 runs, 0 logs: all is well\n"
-    assert not outputs.exists()
 
 
 def test_a_directory_that_may_not_be_read_hides_no_other(

@@ -11,11 +11,10 @@ import pytest
 import yaml
 
 from evoexp.configuration import compose
-from evoexp.configuration.assignment import assigned
 from evoexp.configuration.building import condition_of
 from evoexp.configuration.compose import expand
 from evoexp.configuration.experiment import Budget
-from evoexp.configuration.overrides import collect
+from evoexp.configuration.overrides import assigned, collect
 from evoexp.configuration.search_path import find, searched_first
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from hostile_data import places

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 
 from evoexp.configuration.compose import expand
 from evoexp.configuration.search_path import description, find, folders, options, searched_first
@@ -165,42 +166,15 @@ def test_experiments_that_are_files_are_swept_over(
         expand(["experiment=one.yaml,./one.yaml"], multirun=True)
 
 
-NO_EXPERIMENT = "experiment: must be a file that begins with '# @package _global_'"
-NO_LIST = "experiment: must be a file of settings whose 'defaults' are a list"
+REFUSED: dict[str, str] = yaml.safe_load(Path(__file__).with_name("refused_files.yaml").read_text())
+TEXTS = {"HEAD": HEAD, "DEFAULTS": DEFAULTS, "WHOLE": WHOLE, "ENTRY": ENTRY}
 
 
 @pytest.mark.examples(4)
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", NO_EXPERIMENT),
-        (f"defaults:{DEFAULTS}", NO_EXPERIMENT),
-        (f"{WHOLE}ga: [1,\n", "experiment: must be a YAML file (line "),
-        (f"{WHOLE}gaa: 3\n", "gaa: unknown setting; did you mean 'ga'?"),
-        (f"{WHOLE}ga: 3\n", "ga: must be a mapping of settings, was 3"),
-        (f"{WHOLE}conditions: 3\n", "conditions: must be a mapping of labels"),
-        (f"{ENTRY}3", "conditions.a: must be a list of overrides, was 3"),
-        (f"{ENTRY}[3]", "conditions.a: must be a list of overrides, was [3]"),
-        (f"{ENTRY}{{reading: {{b: []}}}}", "conditions.a.reading"),
-        (f"{ENTRY}{{readings: [seed=1]}}", "conditions.a.readings: must be"),
-        (f"{ENTRY}{{readings: {{b: seed=1}}}}", "conditions.a: must be"),
-        (f'{ENTRY}[]\n  "{{}}": ["seed=1"]', "must be a label with one {} per swept override"),
-        (f'{ENTRY}[]\n  "{{}} {{}}": ["seed=1,2"]', "a label with one {} per swept override"),
-        (f"{ENTRY}[num_replicates=3]", "conditions.a: must be free of num_replicates, which"),
-        (f"{ENTRY}[budget=smoke]", "conditions.a: must be free of budget"),
-        (f"{ENTRY}[ga.population_sise=3]", "unknown setting; did you mean 'population_size'?"),
-        (f"{ENTRY}[ga=other]", "ga: no option 'other' (options: "),
-        (f"{ENTRY}[hydra.run.dir=x]", "nothing of Hydra's own"),
-        (f'{ENTRY}["seed=1,2"]\n  "a · seed=1": []', "must be labels that differ, was 'a · seed=1"),
-        (f"{ENTRY}[ga.population_size=0]", "ga.population_size: must be at least 1, was 0"),
-        (f"{HEAD}defaults: 3\n", NO_LIST),
-        (f"{HEAD}- 1\n- 2\n", NO_LIST),
-        (f"{HEAD}defaults:\n  - override /gaa: x\n", "group: no option 'gaa'; did you mean 'ga'?"),
-        (f"{HEAD}defaults:\n  - override /ga: minus\n", "ga: no option 'minus'"),
-        (f"{HEAD}defaults:\n  - override /ga: lavoie\n", "collision: must be chosen: chen, "),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), REFUSED.items())
 def test_files_that_cannot_be_composed(write: Write, text: str, message: str) -> None:
+    for name, whole in TEXTS.items():
+        text = text.replace(name, whole)
     with pytest.raises(EvoexpError) as caught:
         expand([f"experiment={write(text)}"])
     assert message in str(caught.value) and "\n" not in str(caught.value)

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from evoexp.attachments import keep_all
-from evoexp.batch.fan_out import fan_out
-from evoexp.batch.jobs import Job
+from evoexp.batch.jobs import Job, fan_out
 from evoexp.batch.workers import Workers
 from evoexp.condition import Condition
 from evoexp.configuration.compose import expand

@@ -15,9 +15,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.attachments import File, keep, located
+from evoexp.attachments import File, keep, located, mesh_content
 from evoexp.errors import EvoexpError, SettingError
-from evoexp.mesh_files import mesh_content
 from evoexp.records import FloatArray
 from evoexp.robots.urdf import ROBOT_DATA, Urdf, robot_file
 from evoexp.robots.urdf_model import urdf_model

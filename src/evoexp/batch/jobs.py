@@ -3,28 +3,51 @@
 Kernels of conditions are compiled, or loaded, before their replicates are timed: each kind of
 condition searches for two generations and judges a motion; the server of worker processes does so
 before it forks them.
+
+With workers of a cluster of `distributed` nothing is shared but the network. Each task tells which
+code asked for it; a worker with other code refuses it, as its results could be others.
 """
 
 import contextlib
 import functools
+import hashlib
 import itertools
+import json
+import logging
+import os
 import re
+import socket
+import threading
 import time
 import traceback
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from evoexp.attachments import keep_all
-from evoexp.batch.live_curves import CurveFile
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
+from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.batch.workers import DIED_TWICE, Died, Workers
 from evoexp.condition import Condition
-from evoexp.records import ReplicateSummary, generations
+from evoexp.errors import EvoexpError, printable
+from evoexp.records import Block, ReplicateSummary, generations
+from evoexp.version import __version__
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
 COMPILING_S = 600.0  # [s] that a short call may take; replicates that compile would be late, too
 _NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+# [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
+TASK_S = 0.2
+MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
+AHEAD = 2  # tasks per worker that are sent before earlier ones come back
+DEATHS = 1  # of workers that a task may cause and still be tried again
+_ALONE = threading.Lock()  # a worker of several threads runs one replicate at a time
+INTERVAL_S = 0.2  # [s] between two files of a worker
+NUM_POINTS = 48  # of a curve, at most
+
+_written: dict[str, float] = {}  # folder → when this process left a curve there last
 
 
 class Job(NamedTuple):
@@ -129,3 +152,228 @@ def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
             judge_motion(searching, problem, motion)
             if motion is not None:  # what touches nothing needs the kernels of the closest approach
                 judge_motion(searching, problem, Motion(motion.q[[0, 0]]))
+
+
+# many replicates: in workers of this machine, or of a cluster
+
+
+def fan_out(
+    jobs: Sequence[Job],
+    workers: Workers | None,
+    limits: ReplicateLimits = NO_LIMITS,
+    curves: Path | None = None,
+) -> Iterator[list[Outcome]]:
+    """Run jobs in worker processes, or in this one; yield outcomes as they come.
+
+    A worker that dies costs its own task: each job of that runs again in a task of its own. A job
+    whose worker died of it alone, or that took too long or too much memory, runs once more at the
+    end, beside no other. See `run_jobs` for the arguments.
+    """
+    if workers is None:
+        for job in jobs:
+            outcomes = run_jobs([job], limits, curves=curves)
+            yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
+        return
+    run = functools.partial(run_jobs, limits=limits, in_worker=True, curves=curves)
+    replicates = Replicates(jobs, workers.number, limits)
+    yield from workers.results(run, replicates.next_task, replicates.end_task)
+
+
+class Replicates:
+    """Jobs on their way through workers, of this machine or of a cluster.
+
+    They go in tasks of about `TASK_S`, by the times seen of late. Before any is seen, tasks are
+    long, and end when they take too long: replicates that need the same library stand together,
+    and are best run where it is loaded.
+    """
+
+    def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
+        self._limits, self._num_workers, self._waiting = limits, num_workers, deque(jobs)
+        self._seconds, self._count = 0.0, 0.0  # of the replicates that ended of late
+        self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
+        self._last: deque[Job] = deque()  # to be run a last time
+        self._tried_last: set[tuple[str, int]] = set()
+
+    def next_task(self, num_running: int) -> tuple[list[Job]] | None:
+        """Return the next jobs for a worker; those of a last time run beside nothing."""
+        if self._suspects:
+            return ([self._suspects.popleft()],)
+        if self._waiting:
+            mean = self._seconds / self._count if self._count else 0.0
+            fair = -(-len(self._waiting) // (2 * self._num_workers))
+            size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
+            return ([self._waiting.popleft() for _ in range(min(size, len(self._waiting)))],)
+        return ([self._last.popleft()],) if self._last and not num_running else None
+
+    def end_task(self, task: tuple[Any, ...], end: list[Outcome] | Died) -> list[Outcome] | None:
+        """Take in the outcomes of jobs; return those that stand."""
+        jobs: list[Job] = task[0]
+        if isinstance(end, Died):
+            if len(jobs) > 1:
+                self._suspects += jobs
+                return []
+            reason, timeout_s = DIED_TWICE, self._limits.timeout_s
+            if timeout_s is not None and end.seconds >= timeout_s:
+                reason = f"{self._limits.reason}, in compiled code: its process was ended"
+            trace = f"The worker process was terminated {end.seconds:.1f} s after it began."
+            end = [Outcome(*jobs[0].key, reason, trace, b"", end.seconds, may_pass=True)]
+        # jobs that the task did not begin wait again; earlier times count half from now on, so
+        # that slow first jobs are soon forgotten
+        self._waiting.extendleft(reversed(jobs[len(end) :]))
+        self._seconds = self._seconds / 2.0 + sum(outcome.wall_s for outcome in end)
+        self._count = self._count / 2.0 + len(end)
+        final = []
+        for job, outcome in zip(jobs, end, strict=False):
+            if outcome.may_pass and job.key not in self._tried_last:
+                self._last.append(job)
+                self._tried_last.add(job.key)
+            else:
+                final.append(outcome)
+        return final
+
+
+class ClusterError(EvoexpError):
+    """A cluster that cannot be used."""
+
+
+def cluster_fan_out(
+    jobs: Sequence[Job], settings: RunnerSettings, limits: ReplicateLimits = NO_LIMITS
+) -> Iterator[list[Outcome]]:
+    """Run jobs on a cluster; yield outcomes as they come.
+
+    Replicates are run again as in `fan_out`. A scheduler blames whatever waits on a worker that
+    dies: the last time, a replicate runs beside no other.
+    """
+    try:
+        import distributed
+    except ImportError:
+        must = "runner=dask needs distributed: pip install 'evoexp[cluster]'"
+        raise ClusterError(must) from None
+    # a lost scheduler is told below, in one line
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    with _client(distributed, settings) as client:
+        num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+        replicates = Replicates(jobs, num_workers, limits)
+        sent: dict[str, tuple[list[Job]]] = {}  # by the key of the task
+        running: Any = distributed.as_completed(loop=client.loop)
+        while True:
+            while len(sent) < AHEAD * num_workers and (task := replicates.next_task(len(sent))):
+                arguments = (code_identity(), *task, limits)
+                future = client.submit(run_checked, *arguments, pure=False, retries=0)
+                sent[future.key] = task
+                running.add(future)
+            if not sent:
+                return
+            future = next(running)
+            try:
+                end = future.result()
+            except distributed.scheduler.KilledWorker:
+                end = Died(0.0)  # the scheduler does not tell when it began
+            except (ModuleNotFoundError, distributed.CancelledError) as error:
+                reason = printable(str(error).splitlines()[0])
+                if "scheduler-" in reason:  # connection-lost, restart
+                    raise ClusterError(
+                        f"runner.address: the scheduler at {client.scheduler.address} went away; "
+                        "finished replicates are stored: run again for the others"
+                    ) from None
+                must = f"runner.address: a worker cannot run evoexp: {reason}"
+                raise ClusterError(must) from None
+            finally:
+                future.release()
+            if outcomes := replicates.end_task(sent.pop(future.key), end):
+                yield outcomes
+
+
+def run_checked(code: str, jobs: Sequence[Job], limits: ReplicateLimits) -> list[Outcome]:
+    """Run replicates in a worker of a cluster, if its code is that which asks for them."""
+    if code != code_identity():
+        raise ClusterError(
+            f"runner.address: the worker on {socket.gethostname()} must have evoexp {code}, has "
+            f"{code_identity()}"
+        )
+    with _ALONE:
+        return run_jobs(jobs, limits, in_worker=True)
+
+
+@functools.cache
+def code_identity() -> str:
+    """Return version and hash of evoexp's code, wherever it is installed."""
+    root, digest = Path(__file__).parents[1], hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes())
+    return f"{__version__} ({digest.hexdigest()[:12]})"
+
+
+@contextlib.contextmanager
+def _client(distributed: Any, settings: RunnerSettings) -> Iterator[Any]:
+    """Connect to a scheduler, or to workers on this machine that end with the body."""
+    if settings.address is not None:
+        try:
+            client = distributed.Client(settings.address, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            reason = printable(str(error).splitlines()[0]) if str(error) else "no answer"
+            must = "runner.address: must be the address of a scheduler that answers"
+            raise ClusterError(f"{must}, was {printable(settings.address)} ({reason})") from None
+        with client:
+            yield client
+        return
+    import dask
+
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": DEATHS}),
+        distributed.LocalCluster(
+            n_workers=settings.num_workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+# convergence of running replicates: each worker leaves it in a file, now and then
+
+
+class Curve(NamedTuple):
+    """Convergence of a replicate so far."""
+
+    condition_id: str  # 64 hex digits
+    replicate: int  # its index
+    generation: int  # the last one
+    # best cost so far at up to `NUM_POINTS` generations, from the first to the last one; inf where
+    # nothing is solved
+    costs: list[float]
+
+
+class CurveFile:
+    """Hears the generations of one replicate, and leaves their convergence for others to see."""
+
+    def __init__(self, folder: Path, condition_id: str, replicate: int) -> None:
+        self._folder, self._of = folder, (condition_id, replicate)
+        self._costs: list[float] = []
+
+    def hear(self, block: Block) -> None:
+        """Note generations; write at most every `INTERVAL_S`, whatever replicate is running."""
+        self._costs += [float(best.cost) for best in block.best_of_each]
+        now, key = time.monotonic(), str(self._folder)
+        if now - _written.setdefault(key, now) < INTERVAL_S:
+            return
+        _written[key] = now
+        last = len(self._costs) - 1
+        steps = min(NUM_POINTS - 1, last)
+        thinned = [self._costs[k * last // steps] for k in range(steps)] + self._costs[-1:]
+        with contextlib.suppress(OSError):  # nobody looks any more, or the disk is full
+            unfinished = self._folder / f"{os.getpid()}.unfinished"
+            unfinished.write_text(json.dumps(Curve(*self._of, last, thinned)))
+            unfinished.replace(self._folder / f"{os.getpid()}.json")
+
+
+def read_curves(folder: Path) -> list[Curve]:
+    """Return the curves that the workers left last, one of each."""
+    curves = []
+    for path in sorted(folder.glob("*.json")):
+        with contextlib.suppress(OSError, ValueError, TypeError):
+            curves.append(Curve(*json.loads(path.read_text())))
+    return curves

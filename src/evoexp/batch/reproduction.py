@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.batch.memory_limit import machine_memory, refuse_large
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
+from evoexp.batch.runner_settings import machine_memory, refuse_large
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, EvoexpError, MissingDistribution
 from evoexp.planners.proofs import judge_motion

@@ -7,12 +7,19 @@ mark of completion, so an interrupted batch is resumed by asking for it again.
 import contextlib
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from evoexp.batch.jobs import Job, Outcome, one_of_each_kind, warm_kernels
-from evoexp.batch.memory_limit import GIGABYTE, allowed_memory, refuse_large
+from evoexp.batch.jobs import (
+    Job,
+    Outcome,
+    cluster_fan_out,
+    fan_out,
+    one_of_each_kind,
+    warm_kernels,
+)
 from evoexp.batch.replicate_limits import ReplicateLimits
-from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.batch.runner_settings import GIGABYTE, RunnerSettings, allowed_memory, refuse_large
+from evoexp.batch.workers import Workers, num_cores
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests
@@ -20,9 +27,6 @@ from evoexp.store.integrity import lost_replicates, mend
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.summaries import damaged_logs, whole_logs, write_summary
-
-if TYPE_CHECKING:
-    from evoexp.batch.workers import Workers
 
 LEAST_MEMORY = 1.0 * GIGABYTE  # [B] that a replicate may take where nothing is set
 
@@ -104,16 +108,13 @@ class Batch:
                 raise
             self._summarise(self.runs.keys() - self._summarised)
 
-    def _workers(self) -> "contextlib.AbstractContextManager[Workers | None]":
+    def _workers(self) -> contextlib.AbstractContextManager[Workers | None]:
         """Return worker processes; None where there is one, or where a cluster starts them."""
         if self.num_workers == 1 or self._settings.backend == "dask":
             return contextlib.nullcontext()
-        from evoexp.batch.workers import Workers
-
         return Workers(self.num_workers)
 
-    def _outcomes(self, workers: "Workers | None") -> Iterator[list[Outcome]]:
-        """Load the kernels, then run the jobs where the settings say."""
+    def _outcomes(self, workers: Workers | None) -> Iterator[list[Outcome]]:
         allowed = allowed_memory(self._settings, self.num_workers)
         least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
         limits = ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
@@ -123,18 +124,12 @@ class Batch:
         elif self._settings.address is None:  # else the workers are elsewhere
             warm_kernels(kinds, limits)
         if self._settings.backend == "dask":
-            from evoexp.batch.cluster import cluster_fan_out
-
             return cluster_fan_out(self.jobs, self._settings, limits)
-        from evoexp.batch.fan_out import fan_out
-
         return fan_out(self.jobs, workers, limits, self._curves)
 
     @property
     def num_workers(self) -> int:
         """Number of worker processes; 1: the replicates are run by this process."""
-        from evoexp.batch.workers import num_cores  # and joblib
-
         return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
 
     @property

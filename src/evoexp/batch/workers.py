@@ -1,25 +1,29 @@
 """Worker processes, each with a pipe of its own.
 
-They are forked from a server that has loaded all libraries (see `worker_server`), which a script
-that uses evoexp is no part of. A worker that dies closes its pipe: nobody waits for it.
+They are forked from a server, which a script that uses evoexp is no part of. It loads all libraries
+once, and the kernels of a batch, and has no threads. A worker that dies closes its pipe: nobody
+waits for it.
 """
 
 import contextlib
+import importlib
 import os
 import pickle
 import signal
 import subprocess
 import sys
+import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection, Pipe, wait
-from multiprocessing.reduction import send_handle
+from multiprocessing.reduction import recv_handle, send_handle
+from queue import SimpleQueue
 from typing import Any, NamedTuple, Self
 
-from evoexp.batch.worker_server import Answer
 from evoexp.errors import EvoexpError
 from evoexp.numeric.cache_folder import cache_root
 
@@ -37,6 +41,13 @@ class WorkerError(EvoexpError):
     """Worker processes that cannot be started, or that die of a task again and again."""
 
 
+class Answer(NamedTuple):
+    """The end of a task: its result, or the error that it raised."""
+
+    result: Any
+    error: Exception | None = None
+
+
 class Died(NamedTuple):
     """The end of a task whose worker died."""
 
@@ -45,8 +56,6 @@ class Died(NamedTuple):
 
 @dataclass(eq=False)
 class _Worker:
-    """One worker process."""
-
     pipe: Connection
     process: int | None = None  # its number; None before its first message
     task: tuple[Any, ...] | None = None  # the arguments of what it is doing; None: nothing
@@ -149,7 +158,6 @@ class Workers:
         self._fill()
 
     def _fill(self) -> None:
-        """Start workers until they are as many as they should be."""
         while len(self._workers) < self.number:
             ours, theirs = Pipe()
             self._workers[ours] = _Worker(ours)
@@ -168,7 +176,7 @@ class Workers:
 
     def _start_server(self) -> None:
         self._server_pipe, theirs = Pipe()
-        code = "from evoexp.batch.worker_server import main; main()"
+        code = "from evoexp.batch.workers import worker_server; worker_server()"
         paths = {"PYTHONPATH": os.pathsep.join(sys.path)}  # as another process would build it
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_THE_PARENT)
         try:
@@ -224,3 +232,71 @@ def num_cores() -> int:
     import joblib  # takes as long as a short command
 
     return int(joblib.cpu_count())
+
+
+# the server, and the loop of a worker
+
+
+def worker_server() -> None:
+    """Load libraries, then make calls and fork a worker for every pipe, until the parent ends.
+
+    The words of the process are the number of its own pipe, and names of modules to load.
+    """
+    parent = Connection(int(sys.argv[1]))
+    try:
+        for name in sys.argv[2:]:
+            importlib.import_module(name)
+    except Exception as error:
+        parent.send(_sendable(error))
+        return
+    # workers that have ended stay zombies: the parent may still send a signal to their numbers
+    with contextlib.suppress(EOFError, ConnectionError):
+        while True:
+            if (call := parent.recv()) is not None:
+                with contextlib.suppress(Exception):
+                    call()
+                continue
+            with Connection(recv_handle(parent)) as own:
+                try:
+                    is_worker = os.fork() == 0
+                except OSError:  # no more processes or memory: the parent sees that the pipe closes
+                    continue
+                if is_worker:
+                    parent.close()
+                    _work(own)
+
+
+def _work(own: Connection) -> None:
+    """Tell the parent the number of this process, then do its tasks."""
+    # a copy of this process that kept the pipe open would hide the worker's end
+    os.register_at_fork(after_in_child=own.close)
+    tasks: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_receive, args=(own, tasks), daemon=True).start()
+    own.send(os.getpid())
+    while True:
+        try:
+            function, arguments = pickle.loads(tasks.get())
+            answer = pickle.dumps(Answer(function(*arguments)), pickle.HIGHEST_PROTOCOL)
+        except Exception as error:
+            answer = pickle.dumps(Answer(None, _sendable(error)))
+        sys.stdout.flush()
+        own.send_bytes(answer)
+
+
+def _receive(own: Connection, tasks: "SimpleQueue[bytes]") -> None:
+    """Take in tasks; end the process with its parent, whatever it does at that moment."""
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            tasks.put(own.recv_bytes())
+    os._exit(0)
+
+
+def _sendable(error: Exception) -> Exception:
+    """Return an error that arrives as it was sent: some cannot be built from their text alone."""
+    trace = "".join(traceback.format_exception(error))
+    with contextlib.suppress(Exception):
+        copy: Exception = pickle.loads(pickle.dumps(error))
+        if str(copy) == str(error):
+            copy.add_note(trace)
+            return copy
+    return EvoexpError(str(error)) if isinstance(error, EvoexpError) else RuntimeError(trace)

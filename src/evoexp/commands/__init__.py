@@ -1,1 +1,1 @@
-"""The commands: one small file each, with `add_arguments` and `main`."""
+"""The commands: a file each with its `main`, and the words, motions and runs that they share."""

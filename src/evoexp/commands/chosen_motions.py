@@ -1,26 +1,20 @@
-"""Motions that commands judge, show and write: of stored replicates, of logs, or out of a file."""
+"""`evoexp view`, `play` and `export`: motions of stored replicates, of logs, or out of a file."""
 
 import argparse
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.batch.reproduction import stored_condition
-from evoexp.commands.arguments import is_motion, is_override
-from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
+from evoexp.commands.command_parser import is_motion, is_override
+from evoexp.commands.motion_files import fitting_motions
 from evoexp.commands.stored_runs import finished_replicate, stored_run
-from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
-from evoexp.paths.motion import Motion
-from evoexp.playback.recording import Heading, Recording, joints_of, record, record_motion
+from evoexp.playback.player_page import page
+from evoexp.playback.recording import Heading, Recording, record, record_motion
 from evoexp.playback.trajectory import SpeedLimits
-from evoexp.playback.trajectory_files import JointTrajectory, fitted
-from evoexp.records import FloatArray
-from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -29,20 +23,7 @@ from evoexp.store.summaries import summary_table
 CHOICES = ("best", "worst", "refuted")  # among the replicates of a run
 FOLDER = "motions"  # of the outputs
 MANY = 4  # motions on one page
-JUDGED = "a joint trajectory: judged by its bodies, not by where it begins and ends"
-
-
-class FittingMotion(NamedTuple):
-    """A motion file in a condition whose shape of solutions it has."""
-
-    label: str  # of the condition
-    condition: Condition
-    solution: FloatArray  # flat; empty: the file holds a joint trajectory
-    motion: Motion | None  # None: the solution has none
-    remarks: tuple[str, ...] = ()  # on how a trajectory was read
-
-
-# words of the command line
+ANSWERS = {True: "yes", False: "no", None: "undecided"}
 
 
 def named_log(word: str, choice: str | int | None) -> tuple[Path, RunDirectory | None]:
@@ -147,83 +128,63 @@ def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
         print(f"{printable(str(path))}  ({text})")
 
 
-# motions in conditions
+# commands that write motions
 
 
-def fitting_motions(
-    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
-) -> tuple[Path, list[FittingMotion]]:
-    """Return the motion file among words, and the conditions of the others whose shape it has."""
-    files = [word for word in words if is_motion(word) or Path(word).exists()]
-    overrides = [word for word in words if word not in files]
-    if len(files) != 1:
-        found = " ".join(files) or "none"
-        raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
-    path = Path(files[0])
-    values = read_motion(path)
-    fitting, misfits = [], dict[str, None]()
-    for experiment in compose.expand(overrides, multirun=multirun, only=only):
-        for label, condition in experiment.conditions:
-            try:
-                fitting.append(_fitting(label, condition, values))
-            except ValueError as misfit:
-                misfits[str(misfit)] = None
-    if not fitting and isinstance(values, JointTrajectory):
-        raise MotionFileError(f"{path}: {'; '.join(misfits)}")
-    if not fitting:
-        plain = all("numbers" in text for text in misfits)
-        included = "" if plain else " (start and goal included)"
-        raise MotionFileError(
-            f"{path}: must be {'; '.join(misfits)}{included}, was {shape_of(values)}"
-        )
-    return path, fitting
+def view(arguments: argparse.Namespace) -> int:
+    """Write motions as one offline page that plays them."""
+    motions = recordings(arguments)
+    write(output_path(arguments, motions, ".html"), page(motions))
+    return 0
 
 
-def stored_motion(log: Path) -> FittingMotion:
-    """Return the best solution of a log, in the condition that is attached to it."""
-    contents = read_log(log)
-    label = f"{contents.condition_id[:12]} #{contents.replicate}"
-    return _solved(label, stored_condition(log, contents), contents.solutions[-1].values)
+def play(arguments: argparse.Namespace) -> int:
+    """Write a motion as a log that plays in Foxglove, and the layout file beside it."""
+    from evoexp.playback.playable_log import LAYOUT, layout, playable_log  # and Foxglove's types
+
+    motion = single(arguments)
+    path = output_path(arguments, [motion], ".mcap")
+    write(path, playable_log(motion))
+    write(path.with_name(LAYOUT), layout())
+    return 0
 
 
-def initial_motion(
-    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
-) -> FittingMotion:
-    """Return the best of an initial population, in the first of conditions of one shape."""
-    experiments = compose.expand(words, multirun=multirun, only=only)
-    conditions = [each for experiment in experiments for each in experiment.conditions]
-    prepared = [each.condition.prepare() for each in conditions]
-    shapes = dict.fromkeys(shape_text(planner.shape(problem)) for planner, problem in prepared)
-    if len(shapes) > 1:
-        raise MotionFileError(
-            f"--write: solutions differ in shape ({'; '.join(shapes)}); choose with --only "
-            + " | ".join(repr(each.label) for each in conditions)
-        )
-    (label, condition), (planner, problem) = conditions[0], prepared[0]
-    first = next(planner.evolve(problem, condition.rng(0)))
-    return _solved(label, condition, first.best)
+def export(arguments: argparse.Namespace) -> int:
+    """Write a motion as a joint trajectory, for a robot or MoveIt."""
+    from evoexp.commands.console import say
+    from evoexp.playback.trajectory import (  # and scipy
+        as_csv,
+        as_json,
+        as_ros,
+        joint_limits,
+        trajectory,
+    )
 
-
-def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMotion:
-    planner, problem = condition.prepare()
-    return FittingMotion(label, condition, solution, planner.motion(problem, solution))
-
-
-def _fitting(label: str, condition: Condition, values: Any) -> FittingMotion:
-    """Return the content of a motion file in a condition; ValueError: it does not fit."""
-    planner, problem = condition.prepare()
-    if not isinstance(values, JointTrajectory):
-        shape = planner.shape(problem)
-        if (solution := flatten(values, shape)) is None:
-            raise ValueError(f"{label}: {shape_text(shape)}")
-        return _solved(label, condition, solution)
-    if not isinstance(condition.robot, Robot):
-        raise ValueError(f"{label}: its robot has no joints for a trajectory")
-    joints = joints_of(condition.robot.build())
-    motion, remarks = fitted(values, joints, condition.length_unit)
-    if len(planner.parts(problem, motion)) > 1:
-        raise ValueError(
-            f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
-            "tell; give the solution (evaluate HASH --write FILE.json)"
-        )
-    return FittingMotion(label, condition, np.empty(0), motion, (JUDGED, *remarks))
+    if not 0.0 < arguments.ramp < math.inf:
+        raise SettingError("--ramp", "greater than 0", arguments.ramp)
+    found = single(arguments)
+    prismatic = np.array([joint.prismatic for joint in found.joints])
+    speeds = speed_limits(arguments).of(prismatic, found.size)
+    names = tuple(joint.name for joint in found.joints)
+    limits = joint_limits(names, arguments.limits, speeds, found.velocity_limits, arguments.ramp)
+    timed = trajectory(found, arguments.timing, limits)
+    if arguments.format == "ros":
+        content = as_ros(timed)
+    else:
+        content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
+    ending = ".csv" if arguments.format == "csv" else ".json"
+    write(output_path(arguments, [found], ending), content)
+    # how long the motion takes, how near it comes to the limits, and what is proven of it
+    speed, acceleration = (
+        float((rate / limit).max()) for rate, limit in zip(timed.rates(), limits, strict=True)
+    )
+    if timed.interpolation == "linear":
+        rates = f"at most {speed:.0%} of a joint's speed, which jumps at every point"
+    else:
+        rates = f"at most {speed:.0%} of a joint's speed, {acceleration:.0%} of its acceleration"
+    verdict = timed.verdict
+    say(
+        f"{timed.times[-1]:.2f} s, {len(timed.times)} points; {rates}; certified: "
+        f"{ANSWERS[verdict.certified]}, margin kept: {ANSWERS[verdict.certified_margin]}"
+    )
+    return 0

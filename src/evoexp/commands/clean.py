@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import itertools
 import json
 import shutil
 from collections.abc import Iterator
@@ -84,10 +85,8 @@ def _print(found: list[Waste], outputs: Path) -> None:
     if not found:
         say(f"{outputs}: nothing to delete")
         return
-    table = new_table("", "kind", "file", *right("kB"))
-    for each in found[:SHOWN]:
-        table.add_row(each.kind, str(each.path.relative_to(outputs)), f"{each.bytes / 1000:.0f}")
-    say(table)
+    shown = ((w.kind, str(w.path.relative_to(outputs)), f"{w.bytes / 1000:.0f}") for w in found)
+    say(new_table("", "kind", "file", *right("kB"), rows=itertools.islice(shown, SHOWN)))
     more = f" ({len(found) - SHOWN} more than shown)" if len(found) > SHOWN else ""
     size = sum(each.bytes for each in found) / 1e6
     say(f"{len(found)} files or folders{more}, {size:.2f} MB")

@@ -1,8 +1,9 @@
-"""The commands by name, and the parsers that read their words."""
+"""The commands by name, the parsers of their words, and which word is an override or a motion."""
 
 import argparse
 import importlib
 import re
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
@@ -10,18 +11,17 @@ from typing import Any, NoReturn
 
 import yaml
 
-from evoexp.commands.arguments import labels
 from evoexp.errors import nearest
 from evoexp.version import __version__
 
-_TYPES: dict[str, Any] = {"int": int, "float": float, "path": Path, "labels": labels}
+MOTION_ENDINGS = (".json", ".npy", ".csv", ".yaml", ".yml")
 _DECLARED: dict[str, Any] = yaml.load(
     resources.files("evoexp").joinpath("assets/commands.yaml").read_bytes(), yaml.CSafeLoader
 )
 COMMANDS: dict[str, str] = {name: command["summary"] for name, command in _DECLARED.items()}
-MODULES = {"list": "list_", "claims": "claim_list"}  # where a module has another name
-
-
+# where a module has another name, or the functions of several commands
+MODULES = dict.fromkeys(("view", "play", "export"), "chosen_motions") | {"list": "list_"}
+MODULES |= {"claims": "claim_list", "pack": "stored_runs"}
 HYDRAS_OPTIONS = {
     "--cfg": "evoexp show experiment=NAME; with --all every setting",
     "--info": "evoexp show experiment=NAME; evoexp list",
@@ -35,6 +35,37 @@ HYDRAS_OPTIONS = {
     "--hydra-help": "evoexp run --help",
 }
 """Option of a Hydra application → evoexp's own way."""
+
+
+def option_words(arguments: argparse.Namespace) -> list[str]:
+    """Return the words that give the same options when a command is typed again."""
+    folders = [word for folder in arguments.config_dir for word in ("--config-dir", folder)]
+    only = ["--only", ",".join(arguments.only)] if arguments.only else []
+    return [*["-m"] * arguments.multirun, *only, *folders]
+
+
+def is_override(word: str) -> bool:
+    """Return whether a word of a command changes a configuration: `a.b=c`, `+a.b=c`, `~a.b`.
+
+    A file of such a name, if there is one, is a file.
+    """
+    return ("=" in word or word.startswith(("~", "+"))) and not Path(word).exists()
+
+
+def is_motion(word: str) -> bool:
+    """Return whether a word of a command is the name of a motion file."""
+    return word.endswith(MOTION_ENDINGS) and not is_override(word)
+
+
+def labels(text: str) -> tuple[str, ...]:
+    """Split labels at their commas, but for those inside brackets: `q=[0,1]` is one label."""
+    parts = map(str.strip, re.split(r",(?![^\[\](){}]*[\])}])", text))
+    if named := tuple(filter(None, parts)):
+        return named
+    raise argparse.ArgumentTypeError(f"must name a condition, was '{text}'")
+
+
+_TYPES: dict[str, Any] = {"int": int, "float": float, "path": Path, "labels": labels}
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -69,6 +100,13 @@ def command_module(name: str) -> ModuleType:
     return importlib.import_module(f"evoexp.commands.{MODULES.get(name, name)}")
 
 
+def command_function(name: str) -> Callable[[argparse.Namespace], int]:
+    """Return the function of a command: `main` of its module, or that of its name."""
+    module = command_module(name)
+    function: Callable[[argparse.Namespace], int] = getattr(module, name, None) or module.main
+    return function
+
+
 def command_parser(name: str) -> CommandParser:
     """Return the parser of one command; its module is imported."""
     summary = COMMANDS[name]
@@ -99,7 +137,6 @@ def whole_parser(
 
 
 def _declare(parser: CommandParser, name: str) -> list[argparse.Action]:
-    """Declare the arguments of a command; return them."""
     module, choice, declared = command_module(name), None, []
 
     def constant(match: re.Match[str]) -> str:

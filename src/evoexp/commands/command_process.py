@@ -1,4 +1,4 @@
-"""The process of a command: its standard streams, its temporary files, and a lack of memory.
+"""The process of a command: its streams, temporary files, lack of memory, and interruptions.
 
 Whatever library makes a temporary file makes it in the folder. The command holds a lock there,
 which the system releases when the process ends, however it ends: a folder of this user whose lock
@@ -6,20 +6,34 @@ is free was left by a command that was killed, and is removed. Nothing else is e
 
 Where addresses are limited (`ulimit -v`), a library that cannot be loaded is an `ImportError`, a
 thread that cannot be started a `RuntimeError`, and some libraries end the process by themselves.
+
+Ctrl-C, SIGTERM and a terminal that closes each end a command in the same orderly way. The first
+signal raises `Interrupted`, by which everything is closed that a command has open. While that
+lasts, further signals do nothing: whoever presses Ctrl-C again disturbs nothing. The exception can
+be lost: Python drops exceptions raised in callbacks of its garbage collector and import system, and
+a library may catch it with a bare `except:`. Closing can hang. A timer therefore raises the
+exception again when it was lost, or when closing takes longer than `PATIENCE_S`; after `CLOSING_S`
+the signal ends the process by its default action, with the same exit code in a shell. No result is
+lost: finished files are complete at any moment.
 """
 
+import atexit
 import contextlib
 import errno
 import fcntl
 import os
 import shutil
+import signal
 import sys
 import tempfile
 import textwrap
+import threading
+import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import FrameType
+from typing import Any, NoReturn
 
 from evoexp.batch.replicate_limits import allowed_addresses
 from evoexp.errors import DamagedStore, printable
@@ -31,6 +45,11 @@ LOCK = "owner.lock"
 MEGABYTE = 10**6
 LEAST_MB = 2_500  # [MB] of addresses; a shipped run that compiles its kernels took 2,219
 _TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new thread", "bad_alloc")
+PATIENCE_S = 3.0  # [s] that closing may take before what it waits for is interrupted, too
+CLOSING_S = 15.0  # [s] that closing may take at all
+ENDING_S = 3.0  # [s] that the interpreter may take to end: an interrupted thread may never do
+AGAIN_S = 0.25  # [s] between two looks whether the exception is still under way
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def use_temporary_folder() -> None:
@@ -140,3 +159,73 @@ def damage_in_lines() -> Iterator[None]:
         warnings.simplefilter("always", DamagedStore)
         warnings.showwarning = show
         yield
+
+
+class Interrupted(BaseException):
+    """Ends a command; no `KeyboardInterrupt`, after which Python may end by SIGINT anyhow."""
+
+
+class Interruption:
+    """Hears the signals that ask this process to end.
+
+    Attributes:
+        number: The first signal that was heard; None: none was.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+        self._since = self._raised = 0.0  # when it was heard, and `Interrupted` raised last [s]
+        self._has_ended = False  # whether the command did
+
+    @property
+    def exit_code(self) -> int:
+        """130 after Ctrl-C, 143 after SIGTERM: as a shell counts."""
+        return 128 + (self.number or signal.SIGINT)
+
+    def hear(self) -> None:
+        """Hear signals from now on; one that this process was started to ignore stays ignored."""
+        for number in _SIGNALS:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self._hear)
+        # the timer of `end` stops once threads have ended, and what libraries do at exit is done:
+        # Python takes its handlers back then, and the timer alone would change the exit code
+        atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
+        # what callbacks and threads of libraries say of their interrupted work helps nobody
+        in_callback, in_thread = sys.unraisablehook, threading.excepthook
+        sys.unraisablehook = lambda it: None if self.number is not None else in_callback(it)
+        threading.excepthook = lambda it: None if self.number is not None else in_thread(it)
+
+    def end(self) -> None:
+        """Raise nothing any more: the command has ended, and the process soon will.
+
+        After a signal, further ones are ignored: they would change the exit code.
+        """
+        self._has_ended = True
+        if self.number is not None:
+            for number in _SIGNALS:
+                if signal.getsignal(number) == self._hear:
+                    signal.signal(number, signal.SIG_IGN)
+            signal.setitimer(signal.ITIMER_REAL, ENDING_S)
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        if self.number is None and not self._has_ended:
+            self.number, self._since = number, time.monotonic()
+            signal.signal(signal.SIGALRM, self._look)
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+            self._raise()
+
+    def _look(self, number: int, frame: FrameType | None) -> None:
+        """Raise again if the exception was lost, or if closing takes too long."""
+        assert self.number is not None, "the timer runs after a signal"
+        now, error = time.monotonic(), sys.exception()
+        while error is not None and not isinstance(error, Interrupted):
+            error = error.__context__  # raised while the exception was handled
+        if self._has_ended or now - self._since > CLOSING_S:
+            signal.signal(self.number, signal.SIG_DFL)
+            os.kill(os.getpid(), self.number)
+        elif now - self._raised > PATIENCE_S or error is None:
+            self._raise()
+
+    def _raise(self) -> NoReturn:
+        self._raised = time.monotonic()
+        raise Interrupted

@@ -4,12 +4,12 @@ import argparse
 import shlex
 from pathlib import Path
 
-from evoexp.commands.arguments import option_words
+from evoexp.commands.command_parser import option_words
 from evoexp.commands.console import new_table, print_json, right, say
-from evoexp.commands.pack import unpacked
 from evoexp.commands.report import chosen, folder_name
+from evoexp.commands.stored_runs import unpacked
 from evoexp.condition import Condition
-from evoexp.configuration.labels import SAME
+from evoexp.configuration.conditions import SAME
 from evoexp.errors import SettingError
 from evoexp.report.pages import build, comparison, markdown
 from evoexp.report.results import comparison_files
@@ -85,8 +85,7 @@ def drawn(
 
 def _asked(arguments: argparse.Namespace) -> build.Request:
     """Return the request of the page."""
-    again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
-    words = shlex.join([*arguments.overrides, *again])
+    words = shlex.join([*arguments.overrides, *option_words(arguments)])
     runs, experiments, _, settings = chosen(arguments)
     settings = settings.model_copy(update={"figures": "comparison"})
     names, title, budget, num_replicates = [*runs], "", "", None

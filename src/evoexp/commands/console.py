@@ -66,10 +66,15 @@ def coloured(text: str, colour: str = "") -> Text:
     return Text(printable(text), colour)
 
 
-def new_table(title: str, *columns: str | Column) -> Table:
-    """Return an empty table whose cells are folded where the terminal is too narrow, never cut."""
+def new_table(
+    title: str, *columns: str | Column, rows: Iterable[Iterable[str | Text]] = ()
+) -> Table:
+    """Return a table of rows whose cells are folded where the terminal is too narrow, never cut."""
     heads = [Column(each, overflow="fold") if isinstance(each, str) else each for each in columns]
-    return Table(*heads, title=title or None, title_justify="left")
+    table = Table(*heads, title=title or None, title_justify="left")
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def hash_column(name: str = "hash") -> Column:

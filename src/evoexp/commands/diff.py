@@ -8,8 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.commands.console import new_table, print_json, say
-from evoexp.commands.pack import NAMED, in_archive, looked_into
-from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.commands.stored_runs import (
+    NAMED,
+    in_archive,
+    looked_into,
+    shipped_experiment,
+    stored_or_shipped,
+)
 from evoexp.errors import UnknownHash, printable
 from evoexp.records import TIMES
 from evoexp.store.identity import TAKEN, typed_parts
@@ -116,10 +121,7 @@ def _print(title: str, heads: tuple[str, str], rows: list[tuple[str, Any, Any]])
     if not rows:
         say(f"{title}: the same")
         return
-    table = new_table(title, "", *heads)
-    for name, one, two in rows:
-        table.add_row(name, _text(one), _text(two))
-    say(table)
+    say(new_table(title, "", *heads, rows=((name, _text(a), _text(b)) for name, a, b in rows)))
 
 
 def _text(value: Any) -> str:

@@ -10,17 +10,16 @@ from typing import Any
 from rich.table import Column, Table
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.commands.arguments import is_motion
-from evoexp.commands.chosen_motions import (
+from evoexp.commands.chosen_motions import named_log, write
+from evoexp.commands.command_parser import is_motion
+from evoexp.commands.console import new_table, plain_console, print_json, right, say
+from evoexp.commands.motion_files import (
     FittingMotion,
     fitting_motions,
     initial_motion,
-    named_log,
+    nested,
     stored_motion,
-    write,
 )
-from evoexp.commands.console import new_table, plain_console, print_json, right, say
-from evoexp.commands.motion_files import nested
 from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion
@@ -70,10 +69,8 @@ def main(arguments: argparse.Namespace) -> int:
     groups = list(alike.values())
     for group in groups:
         if (listing := group[0][1]) is not None:  # a row per configuration of the motion
-            table = new_table(_labels(group), *right(*listing.names))
-            for cells in listing.rows:
-                table.add_row(*map(_cell, cells))
-            say(table)
+            texts = (map(_cell, cells) for cells in listing.rows)
+            say(new_table(_labels(group), *right(*listing.names), rows=texts))
     for table in _tables([[row for row, _ in group] for group in groups], plain_console().width):
         say(table)
     for group in groups:
@@ -89,7 +86,6 @@ def _labels(group: Sequence[_Judged]) -> str:
 
 
 def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
-    """Return the motion that the words name, in every condition that it fits."""
     words: list[str] = arguments.overrides
     if arguments.write is not None and arguments.write.suffix != ".json":
         raise MotionFileError(f"--write: must be a file that ends in .json, was {arguments.write}")
@@ -115,10 +111,9 @@ def _tables(columns: list[list[dict[str, Any]]], width: int) -> list[Table]:
     for k in range(0, len(columns), count):
         shown = columns[k : k + count]
         heads = [[f"{row['label']}\n{row['condition'][:12]}" for row in group] for group in shown]
-        table = new_table("", Column(no_wrap=True), *right(*map("\n".join, heads)))
-        for name in names:
-            table.add_row(name, *(_cell(group[0].get(name)) for group in shown))
-        tables.append(table)
+        cells = ((name, *(_cell(group[0].get(name)) for group in shown)) for name in names)
+        first, others = Column(no_wrap=True), right(*map("\n".join, heads))
+        tables.append(new_table("", first, *others, rows=cells))
     return tables
 
 

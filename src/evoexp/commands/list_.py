@@ -9,8 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
-from evoexp.commands.pack import in_archive, looked_into
-from evoexp.commands.stored_runs import stored_runs
+from evoexp.commands.stored_runs import in_archive, looked_into, stored_runs
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.store.files import listed
@@ -45,33 +44,28 @@ def _print(arguments: argparse.Namespace, place: str, stored: Iterable[NamedRun]
         if arguments.json:
             print_json(failures)
         elif failures:
-            table = new_table("", hash_column(), "condition", *right("#"), "reason")
-            for each in failures:
-                label, reason = coloured(each["label"]), coloured(each["reason"])
-                table.add_row(each["hash"], label, str(each["replicate"]), reason)
-            say(table)
+            keys = ("hash", "label", "replicate", "reason")
+            rows = ([coloured(str(each[key])) for key in keys] for each in failures)
+            say(new_table("", hash_column(), "condition", *right("#"), "reason", rows=rows))
         else:
             say(f"no failed replicates {place}")
         return 0
     names = options("experiment") if arguments.archive is None else ()
     files = [find("experiment", name) for name in names]
-    rows = ((each.name, description(each.name), each.origin, each.path) for each in files)
-    experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in rows]
+    told = ((each.name, description(each.name), each.origin, each.path) for each in files)
+    experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in told]
     runs = [run_row(name, run) for name, run in stored]
     if arguments.json:
         print_json({"experiments": experiments, "runs": runs})
         return 0
-    table = new_table("experiments", "run experiment=", "description", "from")
-    for each in experiments:
-        table.add_row(each["name"], each["description"], each["origin"])
     if experiments:
-        say(table)
+        cells = ([each[key] for key in EXPERIMENT_KEYS[:3]] for each in experiments)
+        say(new_table("experiments", "run experiment=", "description", "from", rows=cells))
     say(run_table(f"runs {place}", runs) if runs else f"no runs {place}")
     return 0
 
 
 def _failures(stored: Iterable[NamedRun]) -> list[dict[str, Any]]:
-    """Return the failed replicates, run by run."""
     rows = []
     for name, run in stored:
         if isinstance(run, EvoexpError) or not run.failed():

@@ -1,21 +1,129 @@
-"""Files of motions: nested lists in a planner's documented shape, or joint trajectories."""
+"""Files of motions: nested lists in a planner's shape, or joint trajectories; what they fit."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.commands.arguments import MOTION_ENDINGS
+from evoexp.batch.reproduction import stored_condition
+from evoexp.commands.command_parser import MOTION_ENDINGS, is_motion
+from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.errors import MotionFileError, printable
 from evoexp.input_files import MEGABYTE, TableError, read_bounded, read_npy
-from evoexp.playback.trajectory_files import LARGEST, parse_message, read_columns, read_message
+from evoexp.paths.motion import Motion
+from evoexp.playback.recording import joints_of
+from evoexp.playback.trajectory_files import (
+    LARGEST,
+    JointTrajectory,
+    fitted,
+    parse_message,
+    read_columns,
+    read_message,
+)
 from evoexp.records import FloatArray
+from evoexp.robots.assembly import Robot
+from evoexp.store.log_reader import read_log
 
 MAX_MOTION = 8 * MEGABYTE
 MOST_VALUES = 200_000  # numbers of a motion; the longest of a shipped experiment has 4,000
 MAX_DEPTH = 16  # nested lists; no planner's shape comes near
 ENDINGS = f"{', '.join(MOTION_ENDINGS[:-1])} or {MOTION_ENDINGS[-1]}"
+JUDGED = "a joint trajectory: judged by its bodies, not by where it begins and ends"
+
+
+class FittingMotion(NamedTuple):
+    """A motion file in a condition whose shape of solutions it has."""
+
+    label: str  # of the condition
+    condition: Condition
+    solution: FloatArray  # flat; empty: the file holds a joint trajectory
+    motion: Motion | None  # None: the solution has none
+    remarks: tuple[str, ...] = ()  # on how a trajectory was read
+
+
+def fitting_motions(
+    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> tuple[Path, list[FittingMotion]]:
+    """Return the motion file among words, and the conditions of the others whose shape it has."""
+    files = [word for word in words if is_motion(word) or Path(word).exists()]
+    overrides = [word for word in words if word not in files]
+    if len(files) != 1:
+        found = " ".join(files) or "none"
+        raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
+    path = Path(files[0])
+    values = read_motion(path)
+    fitting, misfits = [], dict[str, None]()
+    for experiment in compose.expand(overrides, multirun=multirun, only=only):
+        for label, condition in experiment.conditions:
+            try:
+                fitting.append(_fitting(label, condition, values))
+            except ValueError as misfit:
+                misfits[str(misfit)] = None
+    if not fitting and isinstance(values, JointTrajectory):
+        raise MotionFileError(f"{path}: {'; '.join(misfits)}")
+    if not fitting:
+        plain = all("numbers" in text for text in misfits)
+        included = "" if plain else " (start and goal included)"
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(misfits)}{included}, was {shape_of(values)}"
+        )
+    return path, fitting
+
+
+def stored_motion(log: Path) -> FittingMotion:
+    """Return the best solution of a log, in the condition that is attached to it."""
+    contents = read_log(log)
+    label = f"{contents.condition_id[:12]} #{contents.replicate}"
+    return _solved(label, stored_condition(log, contents), contents.solutions[-1].values)
+
+
+def initial_motion(
+    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> FittingMotion:
+    """Return the best of an initial population, in the first of conditions of one shape."""
+    experiments = compose.expand(words, multirun=multirun, only=only)
+    conditions = [each for experiment in experiments for each in experiment.conditions]
+    prepared = [each.condition.prepare() for each in conditions]
+    shapes = dict.fromkeys(shape_text(planner.shape(problem)) for planner, problem in prepared)
+    if len(shapes) > 1:
+        raise MotionFileError(
+            f"--write: solutions differ in shape ({'; '.join(shapes)}); choose with --only "
+            + " | ".join(repr(each.label) for each in conditions)
+        )
+    (label, condition), (planner, problem) = conditions[0], prepared[0]
+    first = next(planner.evolve(problem, condition.rng(0)))
+    return _solved(label, condition, first.best)
+
+
+def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMotion:
+    planner, problem = condition.prepare()
+    return FittingMotion(label, condition, solution, planner.motion(problem, solution))
+
+
+def _fitting(label: str, condition: Condition, values: Any) -> FittingMotion:
+    """Return the content of a motion file in a condition; ValueError: it does not fit."""
+    planner, problem = condition.prepare()
+    if not isinstance(values, JointTrajectory):
+        shape = planner.shape(problem)
+        if (solution := flatten(values, shape)) is None:
+            raise ValueError(f"{label}: {shape_text(shape)}")
+        return _solved(label, condition, solution)
+    if not isinstance(condition.robot, Robot):
+        raise ValueError(f"{label}: its robot has no joints for a trajectory")
+    joints = joints_of(condition.robot.build())
+    motion, remarks = fitted(values, joints, condition.length_unit)
+    if len(planner.parts(problem, motion)) > 1:
+        raise ValueError(
+            f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
+            "tell; give the solution (evaluate HASH --write FILE.json)"
+        )
+    return FittingMotion(label, condition, np.empty(0), motion, (JUDGED, *remarks))
+
+
+# what is in a file
 
 
 def read_motion(path: Path) -> Any:

@@ -67,6 +67,5 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _named(text: str, kind: str, name: str) -> str:
-    """Return text of the template of a kind with the names of a new package."""
     words = name.replace("_", " ").title().replace(" ", "")
     return text.replace(f"my_{kind}", name).replace(f"My{kind.title()}", words)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
+from evoexp.batch.runner_settings import GIGABYTE, replicate_memory
 from evoexp.batch.workers import num_cores
 from evoexp.commands.console import hash_column, new_table, print_json, right, say
 from evoexp.condition import Condition

@@ -12,11 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from evoexp.commands import site
-from evoexp.commands.arguments import is_override, option_words
-from evoexp.commands.command_parser import command_parser
+from evoexp.commands.command_parser import command_parser, is_override, option_words
 from evoexp.commands.console import say, say_each
-from evoexp.commands.pack import unpacked
-from evoexp.commands.stored_runs import stored_runs
+from evoexp.commands.stored_runs import stored_runs, unpacked
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
@@ -52,7 +50,6 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _main_of_all(arguments: argparse.Namespace) -> int:
-    """Draw all reports and the home page, or check them."""
     if given := [*arguments.overrides, *arguments.only, *["-m"] * arguments.multirun]:
         raise SettingError("--all", "given alone", " ".join(given))
     planned = list(planned_reports(outputs_root()))
@@ -149,7 +146,7 @@ def requests(arguments: argparse.Namespace) -> list[build.Request]:
     if runs:
         name = folder_name([*runs], "_runs")
         return [build.Request(name, "", "", tuple(runs.items()), settings, None)]
-    again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
+    again = option_words(arguments)
     return [request_of(experiment, overrides, again) for experiment in experiments]
 
 

@@ -16,8 +16,13 @@ from evoexp.batch.reproduction import (
 )
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import coloured, hash_column, new_table, right, say
-from evoexp.commands.pack import in_archive, looked_into
-from evoexp.commands.stored_runs import finished_replicate, shipped_experiment, stored_or_shipped
+from evoexp.commands.stored_runs import (
+    finished_replicate,
+    in_archive,
+    looked_into,
+    shipped_experiment,
+    stored_or_shipped,
+)
 from evoexp.errors import NothingStored, RevisionMismatch, UnknownHash, printable
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -47,7 +52,6 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison]:
-    """Run the finished replicates of a run again, or one of them."""
     try:
         if replicate is not None:
             return _compare_all(run, [finished_replicate(run, replicate)])

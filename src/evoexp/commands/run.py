@@ -1,4 +1,4 @@
-"""`evoexp run`: the missing replicates of an experiment, then its report."""
+"""`evoexp run`: the missing replicates of an experiment, their progress, then its report."""
 
 import argparse
 import contextlib
@@ -8,19 +8,22 @@ import importlib.util
 import shlex
 import sys
 import tempfile
+import time
 from collections import Counter, deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from rich import progress
+from rich.console import Console, RenderableType
 from rich.table import Table
 
-from evoexp.batch.jobs import Outcome
+from evoexp.batch.jobs import Curve, Outcome, read_curves
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import option_words
+from evoexp.commands.command_parser import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.list_ import run_row, run_table
-from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment, Labelled
@@ -35,6 +38,17 @@ USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
   evoexp list                                       # all {number} experiments, and stored runs"""
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
+PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
+MOST_ROWS = 12  # conditions on the screen: those that a replicate ended of last
+MINUTES_FROM_S = 100.0  # [s] from which the rest is told in minutes
+SPEED_OVER_S = 3600.0  # [s] of the past from which the rest is estimated
+CURVE_WIDTH = 16  # characters of a curve
+LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
+UNSOLVED = "x"
+LIVE_NOTE = (
+    "convergence: best cost so far of the replicate heard last, from its first generation to the "
+    f"one shown, each between its own extremes; {UNSOLVED}: nothing solved yet"
+)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -42,20 +56,16 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         print(USAGE.format(number=len(options("experiment"))), file=sys.stderr)
         return 2
-    multirun, only = arguments.multirun, arguments.only
-    experiments = compose.expand(arguments.overrides, multirun=multirun, only=only)
+    experiments = compose.expand(
+        arguments.overrides, multirun=arguments.multirun, only=arguments.only
+    )
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    words = [*arguments.overrides, *option_words(multirun, only, arguments.config_dir)]
-    command = shlex.join(["evoexp", "run", *words])
+    command = shlex.join(["evoexp", "run", *arguments.overrides, *option_words(arguments)])
     wanted = [
-        (
-            labelled.condition,
-            labelled.condition.num_replicates(experiment.num_replicates),
-            experiment.origin(labelled.label, command),
-        )
+        (each, each.num_replicates(experiment.num_replicates), experiment.origin(label, command))
         for experiment in experiments
-        for labelled in _that_can_run(experiment)
+        for label, each in _that_can_run(experiment)
     ]
     runner = experiments[0].runner
     if arguments.live and runner.backend != "loky":
@@ -96,7 +106,6 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
 def _run(
     batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
 ) -> list[Outcome]:
-    """Run what is missing; return the replicates that failed."""
     if not batch.jobs:
         if batch.is_damaged:
             deque(batch.run(), maxlen=0)  # mends what is no replicate
@@ -107,12 +116,11 @@ def _run(
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
     failures, counts = [], Counter(job.condition_id for job in batch.jobs)
     labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    progress = BatchProgress(
-        plain_console(), {key: (labels[key], counts[key]) for key in counts}, curves
-    )
-    with progress.shown(), contextlib.closing(batch.run()) as outcomes:
+    missing = {key: (labels[key], counts[key]) for key in counts}
+    bars = BatchProgress(plain_console(), missing, curves)
+    with bars.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
-            progress.count(outcome)
+            bars.count(outcome)
             if outcome.reason:
                 failures.append(outcome)
                 failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
@@ -133,8 +141,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
 
     def drawn(experiment: Experiment) -> str:
         say(summary_table(experiment))
-        again = option_words(arguments.multirun, arguments.only, arguments.config_dir)
-        asked = arguments.overrides, again
+        asked = arguments.overrides, option_words(arguments)
         directory = outputs_root() / "reports" / experiment.report_name
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
@@ -194,3 +201,129 @@ def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:
         path = batch.runs[outcome.condition_id].failure_path(outcome.replicate)
         table.add_row(outcome.condition_id[:12], str(outcome.replicate), outcome.reason, str(path))
     return table
+
+
+# progress: bars by condition on a terminal, plain lines in a pipe
+
+
+class BatchProgress(progress.Progress):
+    """Counts replicates done and failed, condition by condition, and says when the rest will be."""
+
+    _curves: Path | None = None
+
+    def __init__(
+        self,
+        console: Console,
+        wanted: Mapping[str, tuple[str, int]],
+        curves: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Prepare; shown inside `shown`.
+
+        Args:
+            wanted: Condition's id → its label, and its replicates to run.
+            curves: Folder in which workers leave the convergence of what they run; None: not shown.
+        """
+        texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
+        texts += ["{task.fields[curve]}"] if curves is not None else []
+        super().__init__(
+            progress.TextColumn("{task.description}", markup=False),
+            progress.BarColumn(bar_width=10),
+            progress.MofNCompleteColumn(),
+            *(progress.TextColumn(text, markup=False) for text in texts),
+            progress.TimeRemainingColumn(),
+            console=console,
+            get_time=clock,
+            speed_estimate_period=SPEED_OVER_S,
+        )
+        self._curves, self._last_line = curves, clock()
+        self._rows = {
+            key: self.add_task(label, total=total, visible=False, failed=0, best="", curve="")
+            for key, (label, total) in wanted.items()
+        }
+        total = sum(total for _, total in wanted.values())
+        self._all = self.add_task("replicates", total=total, failed=0, best="", curve="")
+        self._best = dict.fromkeys(wanted, np.inf)
+        self._failed = dict.fromkeys(wanted, 0)
+        self._known: dict[str, Curve] = {}
+        self._last_shown: dict[str, None] = {}  # conditions on the screen, the newest last
+
+    @contextlib.contextmanager
+    def shown(self) -> Iterator[None]:
+        """Show it while the body runs; leave its last state."""
+        if not self.console.is_terminal:
+            try:
+                yield
+            finally:
+                if self.tasks[-1].completed:
+                    self._say()
+            return
+        if self._curves is not None:
+            self.console.print(LIVE_NOTE)
+        try:
+            with self:
+                yield
+        finally:
+            self.console.show_cursor(True)  # also where the end was interrupted
+
+    def count(self, outcome: Outcome) -> None:
+        """Count one replicate."""
+        key = outcome.condition_id
+        self._failed[key] += bool(outcome.reason)
+        if outcome.summary is not None:
+            self._best[key] = min(self._best[key], outcome.summary.best_cost)
+        best = f"best {self._best[key]:.4g}" if np.isfinite(self._best[key]) else ""
+        self._show_row(key)
+        self.update(self._rows[key], advance=1, failed=self._failed[key], best=best)
+        self.update(self._all, advance=1, failed=sum(self._failed.values()))
+        now = self.get_time()
+        if not self.console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
+            self._last_line = now
+            self._say()
+
+    def _show_row(self, key: str) -> None:
+        """Show a condition; the one that nothing was heard of for the longest time makes room."""
+        self._last_shown.pop(key, None)
+        self._last_shown[key] = None
+        self.update(self._rows[key], visible=True)
+        if len(self._last_shown) > MOST_ROWS:
+            oldest = next(iter(self._last_shown))
+            del self._last_shown[oldest]
+            self.update(self._rows[oldest], visible=False)
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """Return the bars, with the curves that the workers left."""
+        for curve in [] if self._curves is None else read_curves(self._curves):
+            levels = LEVELS if self.console.encoding.startswith("utf") else PLAIN_LEVELS
+            key = curve.condition_id
+            if key in self._rows and self._known.get(key) != curve:
+                self._known[key] = curve
+                self._show_row(key)
+                text = f"{curve.generation} {drawn(curve.costs, levels)}"
+                self.update(self._rows[key], curve=text)
+        return super().get_renderables()
+
+    def _say(self) -> None:
+        total, failed = self.tasks[-1], sum(self._failed.values())
+        done, seconds = int(total.completed) - failed, total.time_remaining
+        rest = "–" if seconds is None else f"{seconds:.0f} s"
+        if seconds is not None and seconds >= MINUTES_FROM_S:
+            rest = f"{seconds / 60:.0f} min"
+        text = f"replicates: {done} of {total.total:.0f} done, {failed} failed, ETA {rest}"
+        self.console.print(text, soft_wrap=True)
+
+
+def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH) -> str:
+    """Draw costs of a replicate, the first and the last included, by levels from least to most."""
+    places = np.linspace(0, len(costs) - 1, min(len(costs), width)).round().astype(int)
+    shown = np.asarray(costs, dtype=np.float64)[places]
+    finite = shown[np.isfinite(shown)]
+    if not finite.size:
+        return UNSOLVED * len(shown)
+    least, extent = finite.min(), np.ptp(finite) or 1.0
+    return "".join(
+        levels[round((cost - least) / extent * (len(levels) - 1))]
+        if np.isfinite(cost)
+        else UNSOLVED
+        for cost in shown
+    )

@@ -20,7 +20,7 @@ from rich.table import Table
 
 from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.commands.arguments import is_override, option_words
+from evoexp.commands.command_parser import is_override, option_words
 from evoexp.commands.console import (
     hash_column,
     new_table,
@@ -30,8 +30,12 @@ from evoexp.commands.console import (
     say,
 )
 from evoexp.commands.list_ import run_row, run_table
-from evoexp.commands.pack import in_archive, looked_into
-from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.commands.stored_runs import (
+    in_archive,
+    looked_into,
+    shipped_experiment,
+    stored_or_shipped,
+)
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
@@ -68,8 +72,8 @@ def main(arguments: argparse.Namespace) -> int:
     as_table = not (arguments.all or arguments.json)
     if any(map(is_override, words)):
         experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
-        again = option_words(arguments.multirun, (), arguments.config_dir)
-        command = ["evoexp", "run", *words, *again]
+        arguments.only = ()  # each command has its own
+        command = ["evoexp", "run", *words, *option_words(arguments)]
         labelled = [(each, label) for each in experiments for label, _ in each.conditions]
         if as_table and len(labelled) > 1:
             for experiment in experiments:
@@ -206,7 +210,6 @@ def _facts(
     rows: Sequence[dict[str, Any]],
     result: dict[str, Any],
 ) -> dict[str, Any]:
-    """Return the facts of all keys."""
     try:
         notes = Condition.from_json(config_json).notes()
     except EvoexpError as error:  # of another revision, or a package that is not installed
@@ -248,7 +251,6 @@ def _components(config: Any) -> Iterator[dict[str, Any]]:
 
 
 def _result(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return counts, costs and effort of replicates."""
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] != "done"]
     best = min(done, key=lambda row: row["best_cost"], default=None)

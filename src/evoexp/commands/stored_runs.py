@@ -1,17 +1,28 @@
-"""Stored runs as commands name them: by a prefix of a hash."""
+"""Stored runs as commands name them, by a prefix of a hash or in an archive; and `evoexp pack`.
 
+`report` and `compare` take the runs of an archive into the store; `show`, `list`, `diff`, `verify`
+and `reproduce` only look into it.
+"""
+
+import argparse
+import contextlib
 import itertools
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from evoexp import shipped
+from evoexp.commands.command_parser import is_override
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
-from evoexp.errors import AmbiguousHash, EvoexpError, NothingStored, UnknownHash
+from evoexp.errors import AmbiguousHash, EvoexpError, NothingStored, UnknownHash, printable
 from evoexp.shipped import Shipped
+from evoexp.store import archive
 from evoexp.store.run_directory import RunDirectory, open_run, outputs_root, resolve, run_names
 
 MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
+ENDING = ".tar"
+NAMED = 3  # runs whose hashes the name of an archive spells out
 
 
 def stored_runs(outputs: Path) -> Iterator[tuple[str, RunDirectory | EvoexpError]]:
@@ -69,3 +80,76 @@ def shipped_experiment(row: Shipped) -> Experiment:
 
     words = [f"experiment={row.experiment}", f"budget={row.budget}"]
     return compose.expand(words, only=[row.label])[0]
+
+
+# archives of runs
+
+
+def pack(arguments: argparse.Namespace) -> int:
+    """Write stored runs as one file, which other commands accept elsewhere."""
+    from evoexp.commands.console import say  # and rich
+
+    runs = {run.condition_id: run for run in map(stored_run, arguments.hashes)}
+    for run in runs.values():
+        if not run.completed():
+            raise NothingStored(f"run {run.hash12}: no finished replicate to pack")
+    names = [run.hash12 for run in runs.values()]
+    more = f"+{len(names) - NAMED}" if len(names) > NAMED else ""
+    path = arguments.output or Path("+".join(names[:NAMED]) + more + ENDING)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    count = archive.pack(list(runs.values()), path)
+    size = path.stat().st_size / 1e6
+    say(
+        f"{printable(str(path))}: {len(runs)} run{'s' * (len(runs) > 1)}, {count} logs, "
+        f"{size:.2f} MB; elsewhere: evoexp show, reproduce or report {printable(path.name)}"
+    )
+    return 0
+
+
+def is_archive(word: str) -> bool:
+    """Return whether a word of a command is an archive of runs."""
+    return word.endswith(ENDING) and not is_override(word)
+
+
+def in_archive(word: str) -> tuple[Path, str] | None:
+    """Return archive and prefix of a hash of a word `RUNS.tar` or `RUNS.tar:HASH`; else None."""
+    head, _, prefix = word.rpartition(":")
+    places = ((word, ""), (head, prefix))
+    return next(((Path(path), own) for path, own in places if is_archive(path)), None)
+
+
+@contextlib.contextmanager
+def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
+    """Give the runs of an archive, or the one that a prefix begins, while the body runs.
+
+    The store stays as it is.
+    """
+    with tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True) as folder:
+        runs = [taken.run for taken in archive.take_in(path, Path(folder))]
+        chosen = [run for run in runs if run.condition_id.startswith(prefix.lower())]
+        if prefix and len(chosen) != 1:
+            held = ", ".join(run.hash12 for run in runs[:NAMED])
+            more = f", … {len(runs) - NAMED} more" if len(runs) > NAMED else ""
+            raise UnknownHash(
+                f"hash: '{prefix}' must begin one run of {printable(str(path))}, begins "
+                f"{len(chosen)} (holds: {held}{more})"
+            )
+        yield chosen
+
+
+def unpacked(words: Sequence[str]) -> list[str]:
+    """Take archives among words into the store; return the hashes of their runs in their place."""
+    from evoexp.commands.console import say
+
+    found: list[str] = []
+    for word in words:
+        if not is_archive(word):
+            found.append(word)
+            continue
+        for taken in archive.take_in(Path(word), outputs_root()):
+            found.append(taken.run.condition_id)
+            say(
+                f"{printable(word)}: run {taken.run.hash12}: {taken.added} replicates added to "
+                f"{outputs_root()}, {taken.kept} there already"
+            )
+    return found

@@ -9,8 +9,7 @@ from pathlib import Path
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
-from evoexp.commands.pack import in_archive, looked_into
-from evoexp.commands.stored_runs import stored_run
+from evoexp.commands.stored_runs import in_archive, looked_into, stored_run
 from evoexp.errors import printable
 from evoexp.store.identity import CONFIG
 from evoexp.store.integrity import DELETE, LogCheck, RunCheck, check_log, check_run

@@ -2,7 +2,7 @@
 
 One function expands an experiment for every command. Whatever is wrong with a configuration is
 found here, before anything is computed, and said in one line. Hydra reads overrides and composes
-the chosen options; settings are assigned to copies of these (see `assignment`).
+the chosen options; settings are assigned to copies of these (see `overrides`).
 """
 
 import contextlib
@@ -25,7 +25,6 @@ from omegaconf.errors import OmegaConfBaseException
 
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.configuration.assignment import assigned
 from evoexp.configuration.building import build_settings, fill_in, planned_replicates
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
@@ -38,6 +37,7 @@ from evoexp.configuration.overrides import (
     Choice,
     Override,
     Value,
+    assigned,
     collect,
     expand_entry,
     refuse_sweeps,
@@ -105,7 +105,6 @@ def parse(text: str) -> Override:
 
 
 def _with_text_keys(value: Any) -> Any:
-    """Return a value with text for every key of its mappings."""
     if isinstance(value, dict):
         return {str(key): _with_text_keys(item) for key, item in value.items()}
     return [_with_text_keys(item) for item in value] if isinstance(value, list) else value
@@ -228,7 +227,6 @@ def _is_changed(
 
 
 def _entries(conditions: Any) -> Iterator[Entry]:
-    """Expand the entries of `conditions`; without any, an empty one."""
     if not isinstance(conditions, dict | None):
         raise SettingError("conditions", "a mapping of labels to lists of overrides", conditions)
     for label, entry in (conditions or {"": []}).items():

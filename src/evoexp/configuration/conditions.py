@@ -1,28 +1,35 @@
-"""The conditions of one experiment: entries of its file crossed with the command line, built once.
+"""The conditions of one experiment: entries of its file crossed with the command line.
 
 An override of the command line wins over an entry. It concerns the conditions that have such a
 setting; one that concerns none is refused.
+
+Every condition has a label, and it is true of the condition. Where the command line overrides a
+setting in which an experiment's conditions differ, the file's label alone would be false, and
+several labels may be of one condition. Such a condition is named by the overriding setting, behind
+the parts that the labels have in common.
 
 A folder of problems as MoveIt writes them, `scenario.folder=…`, gives a condition per problem: a
 `scene0001.yaml` beside a `request0001.yaml`, or folders of these, as MotionBenchMaker has them.
 """
 
-import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.attachments import located
-from evoexp.configuration.assignment import assigned, known_instead
 from evoexp.configuration.building import MARK, condition_of
 from evoexp.configuration.experiment import Budget, Built
-from evoexp.configuration.labels import Crossed, labels_of, refuse_equal_labels, rejoined
 from evoexp.configuration.overrides import (
-    NOT_IDENTITY,
+    AROUND,
+    DELETE,
+    JOIN,
     PLANNER_PARTS,
     Choice,
     Override,
     Value,
+    assigned,
+    known_instead,
+    short_names,
     single_values,
     sweep,
     sweep_texts,
@@ -31,10 +38,30 @@ from evoexp.configuration.refusals import chosen
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.shipped import Option
 
+SAME = " ≡ "  # between labels of one condition
+PLANNER = ("planner", *AROUND)  # groups whose option makes any label of a planner false
 FOLDER, SCENE, REQUEST = "scenario.folder", "scenario.scene", "scenario.request"
 MOST_PROBLEMS = 10_000  # conditions of one call
 
 Entry = tuple[str, Choice]  # label and overrides, each with one value, of an experiment's file
+
+
+class Crossed(NamedTuple):
+    """An entry of an experiment's conditions with one value of each override."""
+
+    label: str  # by what the entry, the sweep, and a folder of problems say
+    entry: str  # label in the experiment's file; empty if the file labels no conditions
+    swept: frozenset[str]  # keys of the overrides that the command line sweeps over
+    own: Choice  # overrides of the entry, each with one value
+    typed: Choice  # overrides of the command line that concern the condition, each with one value
+    choice: Choice  # all overrides of the condition, each with one value
+
+    def is_named(self, labels: Iterable[str]) -> bool:
+        """Whether one of some labels is the entry's or this combination's."""
+        return not {self.entry, self.label}.isdisjoint(labels)
+
+
+Group = tuple[Sequence[Crossed], Built]  # all combinations, in order, that are one condition
 
 
 class Composed(NamedTuple):
@@ -44,19 +71,13 @@ class Composed(NamedTuple):
     options: tuple[Option, ...]  # the option taken of each group
 
 
-class Builder:
-    """Builds the conditions of an experiment at one budget, each choice of overrides once."""
+class Builder(NamedTuple):
+    """Builds the conditions of an experiment at one budget."""
 
-    def __init__(
-        self,
-        name: str,
-        entries: Sequence[Entry],
-        composed: Callable[[Choice], Composed],
-        budget: Budget,
-    ) -> None:
-        self.name, self.budget = name, budget
-        self._entries, self._composed = entries, composed
-        self._known: dict[frozenset[str], Built] = {}
+    name: str  # of the experiment: the label where nothing else tells conditions apart
+    entries: Sequence[Entry]
+    composed: Callable[[Choice], Composed]
+    budget: Budget
 
     def build_all(self, overrides: Choice, only: Sequence[str]) -> dict[str, Built]:
         """Build all conditions, each once; return by their labels those of `only`, or all.
@@ -69,22 +90,17 @@ class Builder:
         picked = rejoined(only, names)
         named = [row for row in rows if row.is_named(picked)] or rows
         self._refuse_unused(overrides, named)
-        members: dict[str, list[Crossed]] = {}
+        found: dict[str, tuple[list[Crossed], Built]] = {}  # by the condition's identity
         for row in rows:
             try:
-                members.setdefault(self._built(row.choice).condition.id, []).append(row)
+                built = self._built(row.choice)
             except EvoexpError:
                 if row in named:
                     raise
-        groups = [(same, self._built(same[0].choice)) for same in members.values()]
-
-        def is_same(row: Crossed, choice: Choice) -> bool:
-            """Return whether another choice gives the same condition."""
-            with contextlib.suppress(EvoexpError):
-                return self._built(choice).condition.id == self._built(row.choice).condition.id
-            return False
-
-        labels = labels_of(groups, is_same)
+                continue
+            found.setdefault(built.condition.id, ([], built))[0].append(row)
+        groups = list(found.values())
+        labels = labels_of(groups)
         picked = rejoined(only, known := {*labels, *names})
         if unknown := [label for label in picked if label not in known]:
             raise UnknownOption("--only", unknown[0], known)
@@ -95,41 +111,36 @@ class Builder:
         }
 
     def _built(self, choice: Choice) -> Built:
-        key = frozenset(each.word for each in choice.values() if each.root not in NOT_IDENTITY)
-        if key not in self._known:
-            config, options = self._composed(choice)
-            condition, is_capped = condition_of(assigned(config, choice), self.budget)
-            self._known[key] = Built(condition, options, is_capped)
-        return self._known[key]
+        config, options = self.composed(choice)
+        condition, is_capped = condition_of(assigned(config, choice), self.budget)
+        return Built(condition, options, is_capped)
 
     def _crossed(self, overrides: Choice) -> Iterator[Crossed]:
         """Yield the entries with each combination of the values that overrides have."""
-        for label, own in self._entries:
-            seen = set[frozenset[str]]()
-            for combination in sweep(overrides):
-                typed = self._concerning(combination, own)
-                words = frozenset(each.word for each in typed.values())
-                if words in seen:  # the swept setting concerns other conditions
-                    continue
-                seen.add(words)
+        for entry, own in self.entries:
+            every = (self._concerning(combination, own) for combination in sweep(overrides))
+            # several are equal where a swept setting concerns other conditions
+            different = {frozenset(each.word for each in typed.values()): typed for typed in every}
+            for typed in different.values():
                 swept = sweep_texts(overrides, typed)
                 for problem, choice in _problem_choices({**own, **typed}):
-                    yield Crossed(self.name, label, swept, problem, own, typed, choice)
+                    label = _joined(entry, *swept.values(), problem) or self.name
+                    yield Crossed(label, entry, frozenset(swept), own, typed, choice)
 
     def _concerning(self, choice: Choice, own: Choice) -> Choice:
         """Return the overrides of the command line that concern a condition."""
-        planner = str(self._composed({**own, **choice}).config.get("planner"))
+        planner = str(self.composed({**own, **choice}).config.get("planner"))
         parts = [key for key in choice if key in PLANNER_PARTS and choice[key].option()]
         not_taken = {key for key in parts if f"{MARK}{key}" not in planner}
         choice = {key: each for key, each in choice.items() if key not in not_taken}
-        return concerning(choice, self._composed({**own, **choice}).config)
+        return concerning(choice, self.composed({**own, **choice}).config)
 
     def _refuse_unused(self, overrides: Choice, rows: Sequence[Crossed]) -> None:
         """Refuse an override of the command line that concerns none of the conditions."""
         for key, override in overrides.items():
             if any(key in row.typed for row in rows):
                 continue
-            configs = [self._composed(row.choice).config for row in rows]
+            configs = [self.composed(row.choice).config for row in rows]
             known = {name for each in configs for name in known_instead(each, override) or ()}
             if known:
                 raise UnknownSetting(key, sorted(known))
@@ -173,3 +184,67 @@ def _problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
         for key, path in ((SCENE, str(scene)), (REQUEST, str(request))):
             files[key] = Override("", key, (Value(path, path),), False, f"{key}={path}")
         yield f"{scene.resolve().parent.name} {number}".strip(), rest | files
+
+
+# labels
+
+
+def refuse_equal_labels(rows: Iterable[Crossed]) -> None:
+    """Refuse labels that occur twice, or cannot be printed."""
+    labels = set[str]()
+    for row in rows:
+        if not row.label.isprintable():
+            raise SettingError("conditions", "labels of printable characters", row.label)
+        if row.label in labels:
+            raise SettingError("conditions", "labels that differ", row.label)
+        labels.add(row.label)
+
+
+def rejoined(parts: Sequence[str], labels: Container[str]) -> list[str]:
+    """Join the parts of labels that were split at commas of theirs; the longest label wins."""
+    found, start = list[str](), 0
+    while start < len(parts):
+        ends = range(len(parts), start, -1)
+        end = next((k for k in ends if ", ".join(parts[start:k]) in labels), start + 1)
+        found.append(", ".join(parts[start:end]))
+        start = end
+    return found
+
+
+def labels_of(groups: Sequence[Group]) -> list[str]:
+    """Return the label of each condition, no two of which are equal."""
+    # keys in which the entries of the experiment's file differ
+    rows = [member for members, _ in groups for member in members]
+    keys = {key for row in rows for key in row.own}
+    words = {key: {row.own[key].word if key in row.own else None for row in rows} for key in keys}
+    varied = {key for key in keys if len(words[key]) > 1}
+    overridden = [varied.intersection(*(m.typed for m in members)) for members, _ in groups]
+    labels = [_label(*group, keys) for group, keys in zip(groups, overridden, strict=True)]
+    if len(set(labels)) < len(labels):  # whole labels differ
+        for k, (members, _) in enumerate(groups):
+            labels[k] = SAME.join(_joined(m.label, *_values(m, overridden[k])) for m in members)
+    return labels
+
+
+def _label(members: Sequence[Crossed], built: Built, overridden: set[str]) -> str:
+    """Return the label of a condition, of whose entries the command line overrides some keys."""
+    labels = list(dict.fromkeys(member.label for member in members))
+    if built.is_capped and not (overridden or any(member.swept for member in members)):
+        return labels[0]  # others differ from it in what the budget caps
+    # entries that do not say what is overridden, or else what all of them say
+    true = [m for m in members if overridden.isdisjoint({*m.own, *PLANNER})] if overridden else []
+    parts = [member.label.split(JOIN) for member in true or members]
+    common = [part for part in parts[0] if all(part in other for other in parts)]
+    name = _joined(*common, *_values(members[0], overridden))
+    return name if overridden and name else SAME.join(labels)
+
+
+def _values(member: Crossed, overridden: set[str]) -> Iterator[str]:
+    """Yield `name=value` of overridden settings; sweeps are part of the label anyhow."""
+    for key, name in short_names(sorted(overridden - member.swept)).items():
+        override = member.typed[key]
+        yield f"~{name}" if override.prefix == DELETE else f"{name}={override.values[0].text}"
+
+
+def _joined(*parts: str) -> str:
+    return JOIN.join(part for part in parts if part)

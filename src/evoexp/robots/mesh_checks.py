@@ -13,9 +13,9 @@ from typing import Any
 import coal
 import numpy as np
 
+from evoexp.attachments import MESHES
 from evoexp.errors import SettingError
 from evoexp.input_files import stand_in
-from evoexp.mesh_files import MESHES
 from evoexp.records import IntArray
 
 PARTED = (".obj", ".dae")  # endings of meshes with parts

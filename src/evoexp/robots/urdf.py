@@ -13,9 +13,16 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import BeforeValidator
 
-from evoexp.attachments import SHA256, File, file_content, keep, located
+from evoexp.attachments import (
+    SHA256,
+    File,
+    file_content,
+    keep,
+    located,
+    mesh_content,
+    package_folders,
+)
 from evoexp.errors import SettingError, nearest
-from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.robots.assembly import AppendArm, Assembly, Chain, assembled
 from evoexp.robots.bodies import Point3
 from evoexp.robots.joint_choice import urdf_notes

@@ -11,9 +11,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.attachments import SHA256, File, file_content, keep, located
+from evoexp.attachments import (
+    SHA256,
+    File,
+    file_content,
+    keep,
+    located,
+    mesh_content,
+    package_folders,
+)
 from evoexp.errors import SettingError, demand, demand_known
-from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
 from evoexp.scenarios import moveit_scene

@@ -16,9 +16,8 @@ from evoexp.collision.certifier.coal_distances import CoalDistance
 from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import Scene, geometry_scene, scene
 from evoexp.paths.motion import Motion, cubic_motion
-from evoexp.robots.arms import Arms
+from evoexp.robots.arms import Arms, PlanarChain
 from evoexp.robots.assembly import ArmParts, Chain, Link
-from evoexp.robots.planar_chain import PlanarChain
 from obstacle_samples import box, sphere
 
 RIGHT_ANGLE = 0.5 * np.pi

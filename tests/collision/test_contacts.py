@@ -11,14 +11,11 @@ import pinocchio as pin
 import pytest
 
 from collision.built_bodies import built, num_before_contact
-from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
-from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.body_collision import BodyCollision, Shapes, leading_free
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.numeric.elementary import DEGREE
-from evoexp.robots.arms import Arms
+from evoexp.robots.arms import Arms, PlanarChain, SerialChain, SerialJoint
 from evoexp.robots.assembly import Robot
-from evoexp.robots.planar_chain import PlanarChain
-from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.obstacles import obstacle_table
 from obstacle_samples import box, half_space, sphere
 from references import arms_6r, arms_7r

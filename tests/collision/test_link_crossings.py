@@ -11,10 +11,16 @@ from hypothesis import strategies as st
 from coal_shapes import distance, placed
 from evoexp.collision.planar.arm_pairs import count_collisions
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
-from evoexp.collision.planar.planar_arms import Arm, closed_form, tolerance_of
-from evoexp.collision.planar.segment_predicates import ROUNDING, meeting, squared_distance
+from evoexp.collision.planar.planar_arms import (
+    ROUNDING,
+    Arm,
+    closed_form,
+    meeting,
+    squared_distance,
+    tolerance_of,
+)
 from evoexp.errors import SettingError
-from evoexp.robots.planar_chain import PlanarChain
+from evoexp.robots.arms import PlanarChain
 from matrix import first
 from obstacle_samples import box, capsule, ellipse, half_space, sphere
 from references import arms_6r

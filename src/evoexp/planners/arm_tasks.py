@@ -26,7 +26,7 @@ from evoexp.planners.moveit_tasks import (
 from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.robots.mesh_pieces import convex_shape
+from evoexp.robots.meshes import convex_shape
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.scenarios.link_motion import LinkMotion

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from evoexp.errors import SettingError, demand, nearest
-from evoexp.robots.mesh_checks import unit_of
+from evoexp.robots.meshes import unit_of
 from evoexp.robots.urdf_model import BASE, LIMIT_SETTINGS, coordinate_names
 from evoexp.robots.urdf_reading import PATH, Mimic, UrdfJoint
 

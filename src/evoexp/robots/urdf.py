@@ -16,11 +16,9 @@ from pydantic import BeforeValidator
 from evoexp.attachments import SHA256, File, file_content, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import mesh_content, package_folders
-from evoexp.robots.assembly import AppendArm, Assembly, Chain, assembled
-from evoexp.robots.bodies import Point3
+from evoexp.robots.assembly import AppendArm, Assembly, Chain, Point3, assembled
 from evoexp.robots.joint_choice import urdf_notes
-from evoexp.robots.mesh_checks import whole_mesh
-from evoexp.robots.mesh_pieces import Decomposition, mesh_pieces
+from evoexp.robots.meshes import Decomposition, mesh_pieces, whole_mesh
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfTree
 from evoexp.robots.urdf_model import given_spheres

@@ -9,11 +9,10 @@ import pinocchio as pin
 from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool
-from evoexp.robots.bodies import placed
+from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool, placed
+from evoexp.robots.forward_kinematics import pose_of
 from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.kinematics import own_axis
-from evoexp.robots.poses import pose_of
 from evoexp.robots.urdf_model import placed_bodies, urdf_model
 from evoexp.robots.urdf_reading import PATH
 

@@ -15,8 +15,7 @@ from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
-from evoexp.robots.mesh_checks import mesh_shape
-from evoexp.robots.mesh_pieces import read_pieces
+from evoexp.robots.meshes import mesh_shape, read_pieces
 from evoexp.robots.urdf_reading import LARGEST, PATH, UrdfBody, UrdfJoint, read_urdf, repeated
 
 if TYPE_CHECKING:

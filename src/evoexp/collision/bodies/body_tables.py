@@ -30,6 +30,8 @@ are units."""
 
 REACH = 3  # column of `BodyTables.balls` behind the centre
 THICKNESS, AROUND = 3, 4  # columns of `BodyTables.cores` behind half the edges
+OBSTACLES, BETWEEN, SELF = range(3)
+"""Rows of the clearances: to obstacles, between arms, between parts of one arm."""
 
 FlatTables = tuple[FloatArray, IntArray]
 """All numbers, and all integers behind each block's first place and number of rows."""

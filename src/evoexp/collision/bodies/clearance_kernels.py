@@ -17,6 +17,7 @@ from evoexp.collision.bodies.body_tables import (
     FIRST_RUN,
     JOINT,
     REACH,
+    SELF,
     STOP_CAPSULE,
     STOP_ENTRY,
     STOP_PART,
@@ -50,7 +51,6 @@ from evoexp.collision.bodies.distances import (
     store_point,
     turned,
 )
-from evoexp.collision.bodies.packing import SELF
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import (
     LANES,

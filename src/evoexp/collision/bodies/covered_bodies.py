@@ -9,9 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest, Shapes
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
-from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.derived_pairs import Pair
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray

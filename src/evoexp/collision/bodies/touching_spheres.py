@@ -15,15 +15,15 @@ from evoexp.collision.bodies.body_collision import (
     BodyCollision,
     Clearances,
     FreeTest,
+    Shapes,
     contiguous_batch,
 )
-from evoexp.collision.bodies.packing import Shapes
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.poses import frame_poses
+from evoexp.robots.forward_kinematics import frame_poses
 from evoexp.scenarios.obstacles import (
     CAPSULE,
     CYLINDER,

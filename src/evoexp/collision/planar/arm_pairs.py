@@ -20,15 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.planar.planar_arms import POINT_ROWS, Arm, tolerance_of
-from evoexp.collision.planar.segment_predicates import (
+from evoexp.collision.planar.planar_arms import (
+    POINT_ROWS,
+    Arm,
     Line,
     meeting,
     sign_product,
     squared_distance,
+    tolerance_of,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
     Mask,
@@ -41,6 +42,7 @@ from evoexp.numeric.vectors import (
     select,
     spread,
     store,
+    transposed,
     upper,
 )
 from evoexp.records import FloatArray, IntArray

@@ -7,11 +7,14 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.body_collision import BodyCollision, Shapes
 from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
-from evoexp.collision.planar.planar_arms import Arm, largest_coordinate, path_configurations
-from evoexp.collision.planar.segment_predicates import contact_tolerance
+from evoexp.collision.planar.planar_arms import (
+    Arm,
+    contact_tolerance,
+    largest_coordinate,
+    path_configurations,
+)
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly

@@ -11,7 +11,6 @@ kept as an OBJ file of one object per piece, which is attached to the condition;
 needs neither the library nor the time.
 """
 
-import contextlib
 import hashlib
 import re
 import tempfile
@@ -26,7 +25,7 @@ import numpy as np
 from evoexp.errors import SettingError, demand
 from evoexp.input_files import stand_in
 from evoexp.mesh_files import MESHES
-from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import cache_root, kept
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray, IntArray
@@ -182,18 +181,15 @@ def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> 
         raise SettingError(field, must, "coacd") from None
     key = hashlib.sha256(content)
     key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, version("coacd"))).encode())
-    kept = cache_root() / "pieces" / f"{key.hexdigest()}.obj"
-    with contextlib.suppress(FileNotFoundError, Damaged):
-        return read_kept(kept)
-    corners, triangles = loaded_mesh(content, ending, field)
-    coacd.set_log_level("error")
-    found = coacd.run_coacd(
-        coacd.Mesh(corners, triangles), threshold=CONCAVITY, max_convex_hull=MOST_PIECES, **SEARCH
-    )
-    text = _written(_grown([points for points, _ in found], corners, triangles), field)
-    with contextlib.suppress(OSError):  # it takes longer the next time
-        write_kept(kept, text)
-    return text
+
+    def cut() -> bytes:
+        corners, triangles = loaded_mesh(content, ending, field)
+        coacd.set_log_level("error")
+        mesh, most = coacd.Mesh(corners, triangles), MOST_PIECES
+        found = coacd.run_coacd(mesh, threshold=CONCAVITY, max_convex_hull=most, **SEARCH)
+        return _written(_grown([points for points, _ in found], corners, triangles), field)
+
+    return kept(cache_root() / "pieces" / f"{key.hexdigest()}.obj", cut)
 
 
 def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, IntArray]:

@@ -145,7 +145,12 @@ class ClosedForm(NamedTuple):
     # where parallel
     mu: FloatArray
     nu: FloatArray  # (4, n) the same on the link of arm 2
-    crossing: BoolArray  # (4, n) whether the links have a point in common
+
+    @property
+    def crossing(self) -> BoolArray:
+        """(4, n) whether the links have a point in common, up to rounding; not if parallel."""
+        mu, nu = self
+        return np.asarray((mu >= 0.0) & (mu <= 1.0) & (nu >= 0.0) & (nu <= 1.0))
 
 
 def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedForm:
@@ -158,8 +163,8 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
 
     where each product is a sine of a difference of two angles times two lengths; for i = j = 2 and
     equal lengths this is Eq. 12. The paper counts mu, nu in (0, 1]; here in [0, 1]: a link has two
-    ends. The formula is rounded, and says nothing of parallel links: whether links cross is decided
-    as by `count_collisions`.
+    ends. The formula is rounded, and says nothing of parallel links: searches count crossings by
+    `count_collisions`.
 
     Args:
         one: Arm 1.
@@ -183,9 +188,7 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
         skew = np.abs(across) > PARALLEL * (one.lengths[i] * two.lengths[j])
         np.divide(_cross(w, v), across, out=mu[pair], where=skew)
         np.divide(_cross(w, u), across, out=nu[pair], where=skew)
-    crossing = np.empty(mu.shape, dtype=np.bool_)
-    _write_crossings(joints_1, joints_2, tolerance_of(one, two), crossing)
-    return ClosedForm(mu, nu, crossing)
+    return ClosedForm(mu, nu)
 
 
 def _joints(arm: Arm, q: FloatArray) -> FloatArray:
@@ -196,19 +199,6 @@ def _joints(arm: Arm, q: FloatArray) -> FloatArray:
 
 def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
     return np.asarray(u[0] * v[1] - u[1] * v[0])
-
-
-@kernel
-def _write_crossings(
-    one: FloatArray, two: FloatArray, tolerance: float, crossing: BoolArray
-) -> None:
-    """Write whether links cross, from the joints (3, 2, n) of both arms."""
-    for pair in range(4):
-        i, j = pair // 2, pair % 2
-        for n in range(crossing.shape[1]):
-            (ax, ay), (bx, by) = one[i, :, n], one[i + 1, :, n]
-            (cx, cy), (dx, dy) = two[j, :, n], two[j + 1, :, n]
-            crossing[pair, n] = meeting((ax, ay, bx, by), (cx, cy, dx, dy), tolerance)
 
 
 @kernel

@@ -219,7 +219,6 @@ def geometry_key(items: Iterable[Any], *numbers: Any) -> str:
 
 
 def _numbers_of(shape: Any) -> list[Any]:
-    """Return all numbers that a shape consists of."""
     if isinstance(shape, coal.ConvexBase):
         faces = range(shape.num_polygons if hasattr(shape, "polygons") else 0)
         return [corners_of(shape), [_corners(shape.polygons(k)) for k in faces]]

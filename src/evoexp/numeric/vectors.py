@@ -33,8 +33,6 @@ Number: TypeAlias = Any
 
 
 class _VectorType(types.Type):
-    """numba's type of one kind of vector."""
-
     lanes: ir.VectorType  # LLVM's type of it
 
     def __init__(self, name: str, item: ir.Type) -> None:
@@ -191,8 +189,6 @@ def select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
 
 @intrinsic
 def _any_lane(typing_context: Any, mask: Any) -> Any:
-    """Return whether a condition holds in any lane."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = builder.bitcast(arguments[0], ir.IntType(LANES))
         return builder.icmp_unsigned("!=", word, ir.Constant(word.type, 0))

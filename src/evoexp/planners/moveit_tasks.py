@@ -11,7 +11,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.forward_kinematics import frame_pose, local_pose
+from evoexp.robots.kinematics import frame_pose, local_pose
 from evoexp.robots.meshes import loaded_mesh
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit import LinkGoal, MoveitTask

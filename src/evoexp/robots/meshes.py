@@ -74,7 +74,6 @@ def whole_mesh(content: bytes, name: str, field: str) -> bytes:
 
 
 def _same(content: bytes, plain: bytes, name: str, field: str) -> bool:
-    """Whether coal reads as much of an OBJ as of its vertices and faces alone."""
     try:
         mesh, other = (load(text, name, field) for text in (content, plain))
     except SettingError:

@@ -19,6 +19,7 @@ from evoexp.collision.bodies.body_tables import (
     FIRST_BALL,
     FIRST_PART,
     FIRST_RUN,
+    MARGIN,
     REACH,
     SELF,
     STOP_ENTRY,
@@ -30,7 +31,6 @@ from evoexp.collision.bodies.body_tables import (
     flattened,
 )
 from evoexp.collision.bodies.clearance_kernels import least_clearances, num_free
-from evoexp.collision.bodies.distances import MARGIN
 from evoexp.collision.distance_maps import DistanceMap
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.numeric.vectors import LANES
@@ -191,7 +191,6 @@ def _cut(own: IntArray, middle: FloatArray, is_sphere: BoolArray) -> list[IntArr
 
 
 def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: IntArray) -> FloatArray:
-    """Return the centre and radius of a ball around some capsules, (4,)."""
     ends = np.concatenate([start[own], start[own] + axis[own]])
     radii = np.concatenate([radius[own], radius[own]])
     center = 0.5 * ((ends - radii[:, None]).min(axis=0) + (ends + radii[:, None]).max(axis=0))

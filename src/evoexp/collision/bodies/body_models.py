@@ -363,7 +363,6 @@ class BodyModel(NamedTuple):
 
 
 def _listed(groups: dict[str, tuple[Pair, ...]], names: tuple[str, ...]) -> list[str]:
-    """Return a line for each group of pairs that has some."""
     named = {
         what: ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
         for what, pairs in groups.items()
@@ -381,6 +380,5 @@ class Carried(NamedTuple):
 
 
 def _shapes(cover: Cover, joint: int, body: int) -> Shapes:
-    """Return a cover as shapes of one body."""
     joints, bodies = (np.full(len(cover.radius), number) for number in (joint, body))
     return Shapes(joints, cover.start, cover.end, cover.radius, bodies)

@@ -19,19 +19,13 @@ from evoexp.collision.bodies.body_collision import (
     contiguous_batch,
 )
 from evoexp.collision.bodies.covered_bodies import ArmCollision
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.forward_kinematics import frame_poses
-from evoexp.scenarios.obstacles import (
-    CAPSULE,
-    CYLINDER,
-    HALF_SPACE,
-    SPHERE,
-    obstacle_table,
-)
+from evoexp.robots.kinematics import frame_poses
+from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, HALF_SPACE, SPHERE, obstacle_table
 from evoexp.validation import Component, LayoutCount, Positive
 
 MOST_PER_LINK = 1000  # spheres; every one is tested against those of the other arms
@@ -55,12 +49,9 @@ class TouchingSpheres(Component):
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
         """Return the model of a robot among obstacles, ready for batches."""
-        if any(link.is_tool for link in assembly.links):
-            raise SettingError(
-                "robot",
-                "without tools: circles of one size cannot show them",
-                "tool_radius above 0",
-            )
+        has_tool = any(link.is_tool for link in assembly.links)
+        must = "without tools: circles of one size cannot show them"
+        demand(not has_tool, "robot", must, "tool_radius above 0")
         arms, moving, centers = self._placed(assembly)
         radii = np.full(len(arms), self.sphere_radius)
         # bodies of different arms against each other, and against obstacles

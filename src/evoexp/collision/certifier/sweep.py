@@ -108,7 +108,6 @@ def sweep_motion(task: Task, goal: Goal, work: Workspace) -> tuple[Sweep, bool]:
 
 @kernel
 def _sweep(task: Task, goal: Goal, work: Workspace, found: Sweep, levels: Levels) -> bool:
-    """Judge a motion; return whether all of it was judged."""
     task, goal, work, found, levels = borrowed((task, goal, work, found, levels))
     bounds, lists, counts = levels.bounds, levels.lists, levels.counts
     begins, ends, depths = levels.begins, levels.ends, levels.depths

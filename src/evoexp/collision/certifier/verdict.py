@@ -19,14 +19,8 @@ from evoexp.collision.certifier.coal_distances import (
     walk_down,
 )
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
-from evoexp.collision.certifier.task import (
-    MAX_POLISHED,
-    Task,
-    approach_weights,
-    polish,
-    work_space,
-)
-from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
+from evoexp.collision.certifier.task import MAX_POLISHED, motion_task, polish, work_space
+from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
@@ -87,16 +81,12 @@ def is_clear(scene: Scene, motion: Motion, security_margin: float | FloatArray =
 
 
 class _Candidate(NamedTuple):
-    """A distance that coal measured."""
-
     distance: float
     t: float
     pair: int
 
 
 class _Judgement:
-    """One motion being judged."""
-
     def __init__(
         self,
         scene: Scene,
@@ -113,25 +103,8 @@ class _Judgement:
         self.floor = 1e-6 * scene.size
         self.intervals, self.looked, self.wants_first = 0, False, True
         self.best = _Candidate(np.inf, np.nan, -1)
-        polynomials = motion.polynomials
-        if motion.num_segments == 0:
-            polynomials = np.zeros((1, 4, motion.q.shape[1]))
-            polynomials[0, 0] = motion.q[0]
-        bodies, chain = scene.bodies, scene.table.chain
-        exact = bodies.exact[scene.pairs].all(axis=1)
-        self.all_exact = bool(exact.all())
-        self.task = Task(
-            chain,
-            bodies,
-            scene.pairs,
-            exact,
-            np.ascontiguousarray(polynomials),
-            motion.coefficients is None,
-            float(motion.num_segments),
-            approach_weights(chain, bodies, scene.pairs, motion.greatest),
-            moved_by_one(chain, bodies.joint, scene.pairs),
-        )
-        self.work = work_space(self.task)
+        self.task = motion_task(scene, motion)
+        self.all_exact, self.work = bool(self.task.exact.all()), work_space(self.task)
 
     def verdict(self) -> Verdict:
         """Return the verdict."""
@@ -264,7 +237,6 @@ class _Judgement:
         return contact, proven
 
     def _polish(self) -> None:
-        """Walk down to local minima of the pairs that came closest."""
         found, least = self.sweep, float(self.sweep.least[0])
         worth = least + max(self.resolution * least, self.floor)
         self._polish_from(found.pair_least, found.pair_least_at, worth)
@@ -315,7 +287,6 @@ def _joined(leaves: FloatArray) -> FloatArray:
 
 
 def _check(scene: Scene, motion: Motion, security_margin: float | FloatArray) -> None:
-    """Check that the motion fits the model and that every number is in its range."""
     nq = scene.model.nq
     if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
         raise ValueError(f"motion: q must have shape (instants, {nq}), was {motion.q.shape}")

@@ -112,12 +112,10 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
 
 
 def _half_axis(shape: Any) -> float:
-    """Return half the length of the axis of a capsule; 0 of a ball."""
     return float(shape.halfLength) if isinstance(shape, coal.Capsule) else 0.0
 
 
 def _ends(half: float) -> tuple[FloatArray, FloatArray]:
-    """Return both ends (1, 3) of an axis along z."""
     return np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
 
 

@@ -8,10 +8,10 @@ envelopes:
   each arm 1 and each block of eight arms 2 reach toward each other: where they end before they
   meet, no arm of the block can touch. That spares four of five tests of an arm and a block, at the
   price of a load and a comparison each, or once for eight arms and a block.
-- The others are tested one arm against a block, as `segment_predicates` says.
+- The others are tested one arm against a block, as `meeting` of `planar_arms` says.
 
 So counts are the same whatever the vector width: lines and circles nearer than
-`segment_predicates.contact_tolerance` touch, parallel, collinear and vanishing ones, too.
+`planar_arms.contact_tolerance` touch, parallel, collinear and vanishing ones, too.
 """
 
 import math
@@ -279,7 +279,6 @@ def _vectors(two: Population, at: np.uint64) -> Line:
 
 @inlined
 def _links_touch(one: Links, two: Links, bounds: Bounds) -> Mask:
-    """Return whether a line of one arm meets one of another."""
     (first, second), (third, fourth) = one, two
     least = lower(sign_product(first, third), sign_product(first, fourth))
     least = lower(least, lower(sign_product(second, third), sign_product(second, fourth)))
@@ -341,7 +340,6 @@ def _shifted(line: Line, cosine: Number, sine: Number, shift: float) -> Line:
 def _meets_circle(
     lines: Links, center: tuple[Number, Number], radius: float, tolerance: float
 ) -> Mask:
-    """Return whether a line of an arm meets a circle."""
     one = squared_distance(lines[0], center[0], center[1])
     two = squared_distance(lines[1], center[0], center[1])
     return _is_near(lower(one, two), radius, tolerance)

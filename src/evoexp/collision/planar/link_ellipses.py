@@ -17,28 +17,14 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from evoexp.collision.bodies.body_collision import FreeTest, leading_free
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.vectors import (
-    LANES,
-    Vector,
-    load,
-    lower,
-    select,
-    spread,
-    store,
-)
+from evoexp.numeric.vectors import LANES, Vector, load, lower, select, spread, store
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.kinematics import U
-from evoexp.robots.planar_ends import (
-    VECTOR,
-    PlanarArm,
-    block_ends,
-    load_lanes,
-    planar_arm,
-)
+from evoexp.robots.kinematics import VECTOR, U
+from evoexp.robots.planar_ends import PlanarArm, block_ends, load_lanes, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
 from evoexp.validation import Component, LayoutCount
 
@@ -228,15 +214,12 @@ class LinkEllipses(Component):
                 ellipse in its plane.
         """
         arm = planar_arm(assembly)
-        if thick := [link.radius for link in assembly.links if link.radius > 0.0]:
-            raise SettingError(
-                "robot.link_radius", "0: this collision model knows links as lines", thick[0]
-            )
+        for link in assembly.links:
+            must = "0: this collision model knows links as lines"
+            demand(link.radius == 0.0, "robot.link_radius", must, link.radius)
         for k, (kind, center) in enumerate(zip(obstacles.kind, obstacles.center, strict=True)):
-            if kind != ELLIPSE or center[2] != 0.0:
-                raise SettingError(
-                    f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind)
-                )
+            is_flat, must = kind == ELLIPSE and center[2] == 0.0, "an ellipse in the plane z = 0"
+            demand(is_flat, f"scenario.obstacles[{k}].shape", must, int(kind))
         seen = 0 if self.blind else len(obstacles.kind)
         columns = obstacles.center, obstacles.rotation, obstacles.size
         rows = list(zip(*columns, strict=True))[:seen]

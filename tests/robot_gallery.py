@@ -16,7 +16,7 @@ from evoexp.errors import EvoexpError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray, ReplicateSummary
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.robots.poses import frame_pose, local_pose
+from evoexp.robots.kinematics import frame_pose, local_pose
 from evoexp.robots.urdf import ROBOT_DATA
 from evoexp.testing import conditions
 

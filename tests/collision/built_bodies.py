@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, Shapes
 from evoexp.collision.bodies.clearance_kernels import least_clearances, num_free
-from evoexp.collision.bodies.packing import Shapes
 from evoexp.records import FloatArray
 from evoexp.robots.kinematics import kinematic_table
 from evoexp.scenarios.obstacles import ObstacleTable

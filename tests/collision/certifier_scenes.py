@@ -10,7 +10,7 @@ from coal_shapes import mesh
 from evoexp.collision.scene import Scene, geometry_scene
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.paths.motion import Motion, cubic_motion
-from evoexp.robots.mesh_pieces import convex_shape
+from evoexp.robots.meshes import convex_shape
 
 SAMPLES = 10_000  # per segment
 

@@ -16,7 +16,7 @@ from evoexp.collision.covers import body_covers as covers
 from evoexp.collision.covers import solid_balls
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
-from evoexp.robots.mesh_pieces import convex_shape
+from evoexp.robots.meshes import convex_shape
 
 TURN = pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix()
 PLACE = pin.SE3(TURN, np.array([0.3, -0.2, 0.1]))

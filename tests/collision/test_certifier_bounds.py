@@ -20,7 +20,7 @@ from evoexp.collision.certifier.verdict import RESOLUTION, _Judgement, certify, 
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion
-from evoexp.robots.planar_chain import PlanarChain
+from evoexp.robots.arms import PlanarChain
 from matrix import first
 
 SEEDS = st.integers(0, 2**32 - 1)

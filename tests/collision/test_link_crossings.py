@@ -11,10 +11,16 @@ from hypothesis import strategies as st
 from coal_shapes import distance, placed
 from evoexp.collision.planar.arm_pairs import count_collisions
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
-from evoexp.collision.planar.planar_arms import Arm, closed_form, tolerance_of
-from evoexp.collision.planar.segment_predicates import ROUNDING, meeting, squared_distance
+from evoexp.collision.planar.planar_arms import (
+    ROUNDING,
+    Arm,
+    closed_form,
+    meeting,
+    squared_distance,
+    tolerance_of,
+)
 from evoexp.errors import SettingError
-from evoexp.robots.planar_chain import PlanarChain
+from evoexp.robots.arms import PlanarChain
 from matrix import first
 from obstacle_samples import box, capsule, ellipse, half_space, sphere
 from references import arms_6r
@@ -205,20 +211,6 @@ def test_the_closed_form_decides_the_same(arms: Any) -> None:
         assert np.allclose(first_point[:, near], second_point[:, near], rtol=0.0, atol=1e-9)
         assert np.array_equal(found.crossing[pair, met], expected[met])
         assert not found.crossing[pair, ~met].any()  # parallel, and not on one line
-
-
-@pytest.mark.parametrize(
-    ("place", "expected"), [((0.5, 0.0), True), ((0.5, 0.1), False), ((1.1, 0.0), False)]
-)
-def test_the_closed_form_has_a_branch_for_points(place: Any, expected: bool) -> None:
-    """A link without length, on a link or not; and two such."""
-    one, point = Arm((0.0, 0.0), (1.0, 1.0)), Arm(place, (0.0, 1.0))
-    q_1, q_2 = np.array([[0.0], [1.0]]), np.array([[0.0], [2.0]])
-    for found in (closed_form(one, q_1, point, q_2), closed_form(point, q_2, one, q_1)):
-        assert np.isnan([found.mu[0, 0], found.nu[0, 0]]).all()
-        assert found.crossing[0, 0] == expected
-    assert closed_form(point, q_1, point, q_1).crossing[0, 0]
-    assert not closed_form(point, q_1, Arm((0.1, 0.2), (0.0, 0.0)), q_1).crossing[0, 0]
 
 
 def test_many_configurations_and_no_individuals() -> None:

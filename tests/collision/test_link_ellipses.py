@@ -11,8 +11,7 @@ from coal_shapes import distance, placed
 from evoexp.collision.planar.link_ellipses import EllipseCollision, LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.robots.arms import Arms
-from evoexp.robots.planar_chain import PlanarChain
+from evoexp.robots.arms import Arms, PlanarChain
 from evoexp.scenarios.obstacles import EllipseObstacle, obstacle_table
 from obstacle_samples import ellipse, sphere
 from references import arms_6r

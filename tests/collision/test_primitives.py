@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from collision.built_bodies import built, default_pairs, limited
 from collision.certifier_scenes import random_rotation
-from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.body_collision import BodyCollision, Shapes
 from evoexp.robots.kinematics import kinematic_table
 from evoexp.scenarios.obstacles import obstacle_table
 from matrix import num_cases

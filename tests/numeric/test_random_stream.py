@@ -9,14 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.numeric.generator_state import state_bytes, states_behind
-from evoexp.numeric.random_stream import (
-    Block,
-    Draws,
-    draw,
-    draw_index,
-    draw_many,
-    used_up,
-)
+from evoexp.numeric.random_stream import Block, Draws, draw, draw_index, draw_many, used_up
 
 
 def rng() -> np.random.Generator:

@@ -10,7 +10,6 @@ from numba.core.errors import TypingError
 
 from evoexp.numeric.compilation import copy_part, kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
     ceiling,
@@ -21,6 +20,7 @@ from evoexp.numeric.vectors import (
     select,
     spread,
     store,
+    transposed,
     upper,
 )
 from evoexp.records import FloatArray

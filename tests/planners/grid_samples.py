@@ -9,7 +9,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.grid_path_ga.planner import GridPathGa, Problem
-from evoexp.robots.floor_platform import FloorPlatform
+from evoexp.robots.mobile_robots import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 
 FIELDS = {

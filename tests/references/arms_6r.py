@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.body_collision import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,

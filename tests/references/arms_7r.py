@@ -7,7 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.body_collision import Shapes
 from evoexp.records import FloatArray
 from references.arms_6r import add, ball
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from evoexp.robots.mobile_arm import MobileArm
+from evoexp.robots.mobile_robots import MobileArm
 
 LENGTHS = (1.0, 1.0, 0.5)
 

@@ -10,8 +10,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.kinematics import KinematicTable
-from evoexp.robots.poses import IDENTITY, frame_pose, frame_poses, local_pose
+from evoexp.robots.kinematics import IDENTITY, KinematicTable, frame_pose, frame_poses, local_pose
 from evoexp.robots.urdf import Urdf
 
 UR5_LIKE = Path(__file__).parent / "data" / "ur5_like"

@@ -14,12 +14,9 @@ from evoexp.numeric.compilation import kernel
 from evoexp.numeric.vectors import LANES
 from evoexp.records import FloatArray
 from evoexp.robots import planar_ends
-from evoexp.robots.arms import Arms
-from evoexp.robots.dh_chain import DhChain, DhJoint
+from evoexp.robots.arms import Arms, DhChain, DhJoint, PlanarChain, SerialChain, SerialJoint
 from evoexp.robots.kinematics import MAX_JOINTS, kinematic_table
-from evoexp.robots.planar_chain import PlanarChain
 from evoexp.robots.planar_ends import PlanarArm, block_ends, bring_tip_to, planar_arm
-from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from robots.robot_samples import forward_kinematics, placements, random_tree, tool_pose
 
 Z, Y, X = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)

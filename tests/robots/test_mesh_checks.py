@@ -13,9 +13,16 @@ from coal_shapes import distance, distance_of_point, placed
 from evoexp.attachments import PREFIX, File, keep
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.robots import mesh_pieces as module
-from evoexp.robots.mesh_checks import load, triangles_of, unused_vertices, whole_mesh
-from evoexp.robots.mesh_pieces import loaded_mesh, mesh_pieces, read_pieces
+from evoexp.robots import meshes as module
+from evoexp.robots.meshes import (
+    load,
+    loaded_mesh,
+    mesh_pieces,
+    read_pieces,
+    triangles_of,
+    unused_vertices,
+    whole_mesh,
+)
 from evoexp.robots.urdf import Urdf
 from robots.robot_samples import task, urdf_of
 

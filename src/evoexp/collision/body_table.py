@@ -1,18 +1,24 @@
-"""The bodies of a scene as arrays, for the certifier's kernels.
+"""The bodies of a scene as arrays, for the certifier's kernels; and hashes by which they are known.
 
 Every shape is a core, swept by a ball: a sphere is a point and a radius, a capsule a segment and a
 radius. The core is given by its support function (the farthest point in a direction), see
 `convex_distance`.
 """
 
+import functools
+import hashlib
+import json
+from collections.abc import Iterable
+from importlib import metadata
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.box_support import coal, corners_of
+from evoexp.collision.box_support import EXACT, coal, corners_of
 from evoexp.errors import EvoexpError
 from evoexp.numeric.convex_hull import hull_of
+from evoexp.numeric.kernel_folders import sources_key
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
@@ -27,6 +33,9 @@ finitely many steps (its error is ≤ 1e-13)."""
 ROUND_TOLERANCE = 1e-6
 """[-] of the scene's size, for pairs of which coal approaches a curved surface by steps (errors up
 to 4e-8 were seen)."""
+
+_LIBRARIES = ("numpy", "scipy", "coal")  # that work on bodies
+_SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 
 
 class UnsupportedShape(EvoexpError):
@@ -193,3 +202,37 @@ def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[
     from_origin = min(float(np.sqrt(squares.sum(axis=1).max())), float(np.sqrt(x + y + z)) + ball)
     from_axis = min(float(np.sqrt(squares[:, :2].sum(axis=1).max())), float(np.sqrt(x + y)) + ball)
     return from_origin + core.radius, from_axis + core.radius
+
+
+def geometry_key(items: Iterable[Any], *numbers: Any) -> str:
+    """Return a hash of bodies and numbers, and of the code and the libraries that work on them.
+
+    Of a `pin.GeometryObject` its shape, placement and joint count.
+    """
+    digest = hashlib.sha256(_code())
+    for item in items:
+        digest.update(f"{type(item.geometry).__name__} {item.parentJoint}".encode())
+        numbers = (*numbers, *_numbers_of(item.geometry), item.placement.homogeneous)
+    for part in numbers:
+        digest.update(np.ascontiguousarray(part, dtype=np.float64).tobytes())
+    return digest.hexdigest()[:32]
+
+
+def _numbers_of(shape: Any) -> list[Any]:
+    if isinstance(shape, coal.ConvexBase):
+        faces = range(shape.num_polygons if hasattr(shape, "polygons") else 0)
+        return [corners_of(shape), [_corners(shape.polygons(k)) for k in faces]]
+    if isinstance(shape, coal.BVHModelBase):
+        faces = range(shape.num_tris)
+        return [corners_of(shape), [_corners(shape.tri_indices(k)) for k in faces]]
+    return [getattr(shape, name) for name in _SIZES if hasattr(shape, name)]
+
+
+def _corners(triangle: Any) -> list[int]:
+    return [int(triangle[k]) for k in range(3)]
+
+
+@functools.cache
+def _code() -> bytes:
+    versions = [*map(metadata.version, _LIBRARIES)]
+    return hashlib.sha256(json.dumps([*versions, EXACT, sources_key()]).encode()).digest()

@@ -6,19 +6,17 @@ middle of the cell, less what the bodies can approach each other within it. Wher
 positive the bodies are proven apart.
 """
 
-import contextlib
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.body_table import body_table
+from evoexp.collision.body_table import body_table, geometry_key
 from evoexp.collision.box_support import coal, distance
 from evoexp.collision.derived_pairs import Pair, joint_limits
-from evoexp.collision.geometry_key import geometry_key
 from evoexp.collision.motion_bounds import pair_reaches, reaches
-from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import cache_root, kept
 from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
@@ -89,12 +87,8 @@ def distance_map(assembly: Assembly, pair: Pair) -> DistanceMap | None:
     shape = np.array([FINE, FINE if len(moving) == 2 else 1])
     items = [assembly.geometry.geometryObjects[body] for body in pair]
     path = cache_root() / "distances" / geometry_key(items, *assembly.table.chain, low, span)
-    try:
-        bounds = np.frombuffer(read_kept(path)).reshape(shape)
-    except (FileNotFoundError, Damaged):
-        bounds = _bounds(assembly, pair, coordinates, low, span, way[moving])
-        with contextlib.suppress(OSError):
-            write_kept(path, bounds.tobytes())
+    asked = assembly, pair, coordinates, low, span, way[moving]
+    bounds = np.frombuffer(kept(path, lambda: _bounds(*asked).tobytes())).reshape(shape)
     proves_nothing = not (bounds > 0.0).any()
     return None if proves_nothing else DistanceMap(pair, coordinates, low, span / shape, bounds)
 

@@ -13,16 +13,13 @@ from evoexp.numeric.elementary import sincos
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicChain
 
-FRAME = 12
-"""Numbers of a frame: nine of its rotation, row by row, three of its origin."""
-
 # [-] an axis is parallel to its parent's if the cosine between them differs from ±1 by less
 PARALLEL = 1e-12
 
 
 @inlined
 def joint_frames(chain: KinematicChain, q: FloatArray, frames: FloatArray) -> None:
-    """Write the frames of all joints (joints, FRAME) at one configuration q (nq,)."""
+    """Write the frames of all joints (joints, 12) at one configuration q (nq,)."""
     rotation, translation = chain.rotation, chain.translation
     for k in range(len(chain.parent)):
         p, value = chain.parent[k], chain.rule[k, 0] * q[chain.index_q[k]] + chain.rule[k, 1]

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.paths.grids import UNREACHED, Grid, front, grid
 from evoexp.records import FloatArray
 from evoexp.validation import Component, Count, Positive, Vector
@@ -57,29 +57,20 @@ class PotentialFields(Component):
 
     @model_validator(mode="after")
     def _potentials_are_ordered(self) -> Self:
-        if any(b <= a for a, b in pairwise(self.goal_potentials)):
-            raise SettingError(
-                "goal_potentials", "ascending: d1 < d2 < …", list(self.goal_potentials)
-            )
-        if any(b > a for a, b in pairwise(self.obstacle_potentials)):
-            raise SettingError(
-                "obstacle_potentials", "descending: o0 ≥ o1 ≥ …", list(self.obstacle_potentials)
-            )
+        goal, obstacle = list(self.goal_potentials), list(self.obstacle_potentials)
+        rises = all(a < b for a, b in pairwise(goal))
+        demand(rises, "goal_potentials", "ascending: d1 < d2 < …", goal)
+        falls = all(a >= b for a, b in pairwise(obstacle))
+        demand(falls, "obstacle_potentials", "descending: o0 ≥ o1 ≥ …", obstacle)
         return self
 
     def bind(self, blocked: np.ndarray) -> Fields:
         """Return the fields of an occupancy grid (nodes along x, y[, z]), true for obstacles."""
-        if self.neighbourhood > blocked.ndim:
-            raise SettingError(
-                "collision.neighbourhood",
-                f"at most the grid's number of dimensions ({blocked.ndim})",
-                self.neighbourhood,
-            )
+        must, most = f"at most the grid's number of dimensions ({blocked.ndim})", blocked.ndim
+        demand(self.neighbourhood <= most, "collision.neighbourhood", must, self.neighbourhood)
         unsafeness = self._unsafeness(blocked)
-        closed = (
-            blocked if self.max_unsafeness is None else blocked | (unsafeness > self.max_unsafeness)
-        )
-        own = grid(closed)
+        most_unsafe = np.inf if self.max_unsafeness is None else self.max_unsafeness
+        own = grid(blocked | (unsafeness > most_unsafe))
         around = np.pad(unsafeness, 1, constant_values=self.obstacle_potentials[0])
         # the goal's potentials go on with the last difference
         first = np.array([0.0, *self.goal_potentials])

@@ -20,7 +20,7 @@ from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
-from evoexp.robots.mesh_pieces import convex_shape
+from evoexp.robots.meshes import convex_shape
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,

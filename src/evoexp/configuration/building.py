@@ -22,8 +22,8 @@ from evoexp.errors import SettingError, UnknownSetting
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
 from evoexp.robots.assembly import Robot
-from evoexp.robots.joint_choice import joint_roles
 from evoexp.robots.urdf import Urdf
+from evoexp.robots.urdf_model import joint_roles
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, AnySettings, build, construct
 

@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 import uuid
+from collections.abc import Callable
 from pathlib import Path
 
 import platformdirs
@@ -20,10 +21,6 @@ import xxhash
 VARIABLE = "EVOEXP_CACHE"  # names the folder; by default it is the system's for this user
 _SIZE = 16  # [B] of the hash
 _OTHERS_MAY_WRITE = 0o022  # bits of a folder's mode
-
-
-class Damaged(Exception):
-    """A file that is missing, not as it was written, or another user's."""
 
 
 def cache_root() -> Path:
@@ -72,14 +69,23 @@ def is_own(path: Path) -> bool:
     return not hasattr(os, "geteuid") or path.stat().st_uid == os.geteuid()
 
 
-def read_kept(path: Path) -> bytes:
-    """Return the content of a kept file; `Damaged`: it is missing, altered, or not this user's."""
+def kept(path: Path, make: Callable[[], bytes]) -> bytes:
+    """Return the content of a kept file, made and kept first if it is not there."""
+    content = read_kept(path)
+    if content is None:
+        content = make()
+        with contextlib.suppress(OSError):  # it takes longer the next time
+            write_kept(path, content)
+    return content
+
+
+def read_kept(path: Path) -> bytes | None:
+    """Return the content of a kept file; None: it is missing, altered, or not this user's."""
     content = b""
     with contextlib.suppress(OSError):
         content = path.read_bytes() if is_own(path) else b""
-    if content[:_SIZE] != _hash(path, content[_SIZE:]):
-        raise Damaged(path)
-    return content[_SIZE:]
+    is_whole = content[:_SIZE] == _hash(path, content[_SIZE:])
+    return content[_SIZE:] if is_whole else None
 
 
 def write_kept(path: Path, content: bytes) -> None:

@@ -33,8 +33,6 @@ Number: TypeAlias = Any
 
 
 class _VectorType(types.Type):
-    """numba's type of one kind of vector."""
-
     lanes: ir.VectorType  # LLVM's type of it
 
     def __init__(self, name: str, item: ir.Type) -> None:
@@ -191,8 +189,6 @@ def select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
 
 @intrinsic
 def _any_lane(typing_context: Any, mask: Any) -> Any:
-    """Return whether a condition holds in any lane."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = builder.bitcast(arguments[0], ir.IntType(LANES))
         return builder.icmp_unsigned("!=", word, ir.Constant(word.type, 0))
@@ -253,3 +249,36 @@ def lower(one: Vector, two: Vector) -> Vector:
 def upper(one: Vector, two: Vector) -> Vector:
     """Return the greater of two numbers, lane by lane; the first where either is NaN."""
     return select(one < two, two, one)
+
+
+def _interleaved(builder: Any, rows: list[Any], width: int) -> list[Any]:
+    """Return pairs of rows with their groups of `width` numbers exchanged, as a square's halves.
+
+    Row k and row k + width become two: the even groups of both, and the odd ones.
+    """
+    even, odd = [], []
+    for k in range(LANES):
+        source = k if k % (2 * width) < width else k + LANES - width
+        even.append(source)
+        odd.append(source + width)
+    found = list(rows)
+    for k in range(len(rows)):
+        if not k & width:
+            one, two = rows[k], rows[k + width]
+            for place, order in ((k, even), (k + width, odd)):
+                mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), order)
+                found[place] = builder.shuffle_vector(one, two, mask)
+    return found
+
+
+@intrinsic
+def transposed(typing_context: Any, rows: Any) -> Any:
+    """Return eight vectors as rows of a square, transposed: lane j of row i: lane i of row j."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values = [builder.extract_value(arguments[0], k) for k in range(LANES)]
+        for width in (1, 2, 4):
+            values = _interleaved(builder, values, width)
+        return context.make_tuple(builder, signature.return_type, values)
+
+    return rows(rows), generate

@@ -7,8 +7,8 @@ import numpy as np
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.vectors import LANES, load, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import U
-from evoexp.robots.planar_ends import VECTOR, PlanarArm, block_ends, load_lanes
+from evoexp.robots.kinematics import VECTOR, U
+from evoexp.robots.planar_ends import PlanarArm, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.bodies.body_models import BodyModel
-from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
-from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
+from evoexp.collision.bodies.covered_bodies import ArmCollision, CoveredBodies, CoveredCollision
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.collision.box_support import coal
 from evoexp.collision.scene import Part, Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError, demand
@@ -26,7 +26,7 @@ from evoexp.planners.moveit_tasks import (
 from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.robots.mesh_pieces import convex_shape
+from evoexp.robots.meshes import convex_shape
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.scenarios.motion_tasks import ArmMotion, LinkMotion
 from evoexp.scenarios.moveit import MoveitTask
@@ -44,7 +44,7 @@ class ArmProblem:
 
     assembly: Assembly  # the robot, built
     # the touching circles or spheres on it, or its covered bodies
-    collision: SphereCollision | CoveredCollision
+    collision: ArmCollision
     start: FloatArray  # (nq,) [deg]
     goal: FloatArray  # (nq,) [deg]
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
@@ -128,7 +128,7 @@ def arm_problem(
     # a metre of a sliding joint counts as a radian, 57.3 degrees
     units = np.where(assembly.table.slides, 1.0 / DEGREE, 1.0)
     start, goal = (q * units for q in task.ends(assembly.arm_slices))
-    collision: SphereCollision | CoveredCollision
+    collision: ArmCollision
     if isinstance(model, CoveredBodies):
         collision, bodies = _covered(model, assembly, task, scenario, (start, goal))
     else:
@@ -165,9 +165,7 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
     return as_motion(task, q_start, q_goal, task.obstacles)
 
 
-def cover_shapes(
-    collision: SphereCollision | CoveredCollision | BodyModel,
-) -> tuple[CoverShape, ...]:
+def cover_shapes(collision: ArmCollision | BodyModel) -> tuple[CoverShape, ...]:
     """Return the circles, spheres and capsules that a collision model tests."""
     joint, start, end, radius, _ = collision.shapes
     columns = joint.tolist(), start, end, radius.tolist()

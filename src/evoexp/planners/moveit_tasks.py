@@ -11,8 +11,8 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.mesh_pieces import loaded_mesh
-from evoexp.robots.poses import frame_pose, local_pose
+from evoexp.robots.kinematics import frame_pose, local_pose
+from evoexp.robots.meshes import loaded_mesh
 from evoexp.scenarios.motion_tasks import ArmMotion
 from evoexp.scenarios.moveit import LinkGoal, MoveitTask
 from evoexp.scenarios.moveit_files import Pose

@@ -8,11 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.errors import demand, demand_known
-from evoexp.numeric.ordered_sums import length
+from evoexp.numeric.ordered_sums import length, rotation_matrix
 from evoexp.records import FloatArray
-from evoexp.robots.bodies import along
 from evoexp.robots.kinematics import KinematicTable, check_size, kinematic_table
 from evoexp.validation import Component
+
+Point3 = tuple[float, float, float]
 
 
 class Link(NamedTuple):
@@ -201,3 +202,19 @@ def link_capsule(link: Link, name: str) -> Any:
         )
     shape = coal.Capsule(link.radius, length(link.end - link.start))
     return pin.GeometryObject(name, link.joint, 0, along(link.start, link.end), shape)
+
+
+def along(start: FloatArray, end: FloatArray) -> Any:
+    """Return the `pin.SE3` of a capsule or cylinder (coal draws them along z) on a segment."""
+    direction = end - start
+    reach = length(direction)
+    rotation = np.eye(3)
+    if reach > 0.0:
+        upright = np.array([0.0, 0.0, 1.0])
+        rotation = pin.Quaternion.FromTwoVectors(upright, direction / reach).toRotationMatrix()
+    return pin.SE3(rotation, 0.5 * (start + end))
+
+
+def placed(position: Point3, angles: Point3) -> Any:
+    """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes."""
+    return pin.SE3(rotation_matrix(angles), np.array(position))

@@ -13,9 +13,8 @@ from evoexp.numeric.elementary import atan2, sincos
 from evoexp.numeric.vectors import LANES, load, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.kinematics import U
+from evoexp.robots.kinematics import VECTOR, U
 
-VECTOR = U(LANES)
 DAMPING = 1e-3  # [-] of a step, in units of the squared length of the arm
 CLOSE = 1e-9  # [-] of the arm's length: the tip is there
 MOST_STEPS = 200

@@ -23,14 +23,11 @@ from evoexp.attachments import (
     package_folders,
 )
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.assembly import AppendArm, Assembly, Chain, assembled
-from evoexp.robots.bodies import Point3
-from evoexp.robots.joint_choice import urdf_notes
-from evoexp.robots.mesh_checks import whole_mesh
-from evoexp.robots.mesh_pieces import Decomposition, mesh_pieces
+from evoexp.robots.assembly import AppendArm, Assembly, Chain, Point3, assembled
+from evoexp.robots.meshes import Decomposition, mesh_pieces, whole_mesh
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfTree
-from evoexp.robots.urdf_model import given_spheres
+from evoexp.robots.urdf_model import given_spheres, urdf_notes
 from evoexp.robots.urdf_reading import UrdfFile, parsed_xml, read_urdf, urdf_file
 from evoexp.validation import Positive, Settings
 

@@ -9,12 +9,9 @@ import pinocchio as pin
 from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool
-from evoexp.robots.bodies import placed
-from evoexp.robots.joint_choice import joint_roles, standing_values
-from evoexp.robots.kinematics import own_axis
-from evoexp.robots.poses import pose_of
-from evoexp.robots.urdf_model import placed_bodies, urdf_model
+from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool, placed
+from evoexp.robots.kinematics import own_axis, pose_of
+from evoexp.robots.urdf_model import joint_roles, placed_bodies, standing_values, urdf_model
 from evoexp.robots.urdf_reading import PATH
 
 if TYPE_CHECKING:
@@ -61,7 +58,6 @@ class UrdfTree:
         self._disabled = frozenset(self._unjudged())
 
     def _frame(self, name: str, field: str) -> Any:
-        """Find a `pin.Frame` by its name."""
         names = [frame.name for frame in self.model.frames]
         demand_known(name, names, field, f"a frame of the URDF ({', '.join(names)})")
         return self.model.frames[names.index(name)]
@@ -228,7 +224,6 @@ class UrdfTree:
         return ArmParts(links, bodies, tool, self._disabled, followers, states, has_names=True)
 
     def _tool(self, arm: int, carriers: list[tuple[int, Any]]) -> Tool:
-        """Return the tool's frame: the chosen one, or the farthest down the tree."""
         name, field = self.tips[arm]
         if name:
             frame = self._frame(name, field)

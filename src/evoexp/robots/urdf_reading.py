@@ -190,7 +190,6 @@ def _body(link: Any, collision: Any) -> UrdfBody:
 
 
 def _joint(joint: Any, field: str) -> UrdfJoint:
-    """Read a joint; check its kind, ends, axis and limits."""
     kind, name = joint.get("type"), joint.get("name")
     must = f"a URDF whose joints are {', '.join(KINDS[:-1])} or {KINDS[-1]}"
     demand(kind in KINDS, field, must, f"joint '{name}' of type {kind}")
@@ -254,7 +253,6 @@ def _check_tree(links: list[str], joints: dict[str, UrdfJoint], field: str) -> N
 
 
 def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
-    """Check that each rule leads to a joint that is there, and no joint to itself."""
     for joint in joints.values():
         passed = [joint.name]
         while joint.mimic is not None:
@@ -268,8 +266,6 @@ def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
 
 
 class _Check:
-    """Checks elements, attributes and numbers."""
-
     def __init__(self, field: str) -> None:
         self._field = field
 

@@ -1,4 +1,4 @@
-"""Distances of capsules' axes from points, from each other and from obstacles; see `distances`.
+"""Distances of capsules' axes from points, from each other and from obstacles; see `body_tables`.
 
 The distance of a point that moves along a segment to a convex body is a convex function of its
 place on the segment: it is least where its slope changes sign. For boxes the slope (of half the
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.distances import Place
+from evoexp.collision.bodies.body_tables import Place
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import (
     Mask,
@@ -63,7 +63,6 @@ class Crossing(NamedTuple):
 
 @inlined
 def _clamped(value: Vector) -> Vector:
-    """Return a place on a segment: within 0 … 1."""
     found: Vector = lower(upper(value, spread(0.0)), spread(1.0))
     return found
 
@@ -95,7 +94,6 @@ def _slope(t: Vector, segments: Segments, core: Core) -> Vector:
 
 @inlined
 def _narrowed(t: Vector, segments: Segments, core: Core, bracket: Bracket) -> Bracket:
-    """Return a bracket, narrowed by the slope at one more place."""
     slope = _slope(t, segments, core)
     rises = (slope <= 0.0) & (bracket.low < t)
     falls = (slope >= 0.0) & (t < bracket.high)

@@ -16,7 +16,9 @@ from evoexp.collision.bodies.body_tables import (
     FIRST_PART,
     FIRST_RUN,
     JOINT,
+    MARGIN,
     REACH,
+    SELF,
     STOP_CAPSULE,
     STOP_ENTRY,
     STOP_PART,
@@ -24,16 +26,6 @@ from evoexp.collision.bodies.body_tables import (
     THICKNESS,
     BodyTables,
     FlatTables,
-    named_tables,
-)
-from evoexp.collision.bodies.capsule_distances import (
-    Segments,
-    nearest_on_segments,
-    segment_to_point,
-    segment_to_segments,
-)
-from evoexp.collision.bodies.distances import (
-    MARGIN,
     Memory,
     Motion,
     Place,
@@ -43,6 +35,7 @@ from evoexp.collision.bodies.distances import (
     mapped_distance,
     memory_of,
     moved_point,
+    named_tables,
     place_point,
     point_at,
     seen_from,
@@ -50,7 +43,12 @@ from evoexp.collision.bodies.distances import (
     store_point,
     turned,
 )
-from evoexp.collision.bodies.packing import SELF
+from evoexp.collision.bodies.capsule_distances import (
+    Segments,
+    nearest_on_segments,
+    segment_to_point,
+    segment_to_segments,
+)
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import (
     LANES,
@@ -65,14 +63,7 @@ from evoexp.numeric.vectors import (
     upper,
 )
 from evoexp.records import FloatArray
-from evoexp.robots.forward_kinematics import (
-    SPATIAL_FRAME,
-    VECTOR,
-    coordinate,
-    eight_of,
-    spatial_frames,
-)
-from evoexp.robots.kinematics import U
+from evoexp.robots.kinematics import SPATIAL_FRAME, VECTOR, U, coordinate, eight_of, spatial_frames
 from evoexp.scenarios.obstacles import HALF_SPACE
 
 ROUNDING = 1e-12  # [-] of squared coordinates, more than their errors
@@ -345,13 +336,11 @@ def _between_in_frame(tables: BodyTables, memory: Memory, one: int, two: int) ->
 
 @inlined
 def _axis(capsule: FloatArray) -> Segments:
-    """Return a capsule's constant axis."""
     return Segments((capsule[0], capsule[1], capsule[2]), (capsule[3], capsule[4], capsule[5]))
 
 
 @inlined
 def _moved_axis(motion: Motion, capsule: FloatArray) -> Segments:
-    """Return a capsule's axis after a motion."""
     x, y, z = capsule[3], capsule[4], capsule[5]
     axis = turned(motion[0], x, y, z), turned(motion[1], x, y, z), turned(motion[2], x, y, z)
     return Segments(moved_point(motion, capsule[0], capsule[1], capsule[2]), axis)

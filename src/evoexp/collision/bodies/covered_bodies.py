@@ -5,13 +5,14 @@ do not, the covers of that body are made as much smaller as it takes, and pairs 
 to the certifier: the search then sees a little less, and the certifier has the last word.
 """
 
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest, Shapes
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
-from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.derived_pairs import Pair
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
@@ -47,27 +48,25 @@ class CoveredBodies(Component):
         bodies, q = self.covers.bind(assembly).with_maps(), DEGREE * ends
         fitted = bodies.fitted(table, ignored, q)
         collision = fitted.collision(table, ignored)
-        return CoveredCollision(assembly, fitted, collision, table)
+        shapes, pairs = fitted.shapes, fitted.pairs
+        return CoveredCollision(assembly, shapes, pairs, table, collision, fitted)
 
 
-class CoveredCollision(NamedTuple):
-    """Covered bodies of one robot, and the obstacles around it."""
+@dataclass(frozen=True)
+class ArmCollision:
+    """The shapes of one robot, and the obstacles around it."""
 
     assembly: Assembly  # the robot
-    bodies: BodyModel  # its bodies, covered
-    collision: BodyCollision  # the kernels' tables
+    shapes: Shapes  # spheres and capsules of all bodies
+    pairs: Sequence[Pair]  # of bodies that are tested against each other
     obstacles: ObstacleTable  # the obstacle table
-
-    @property
-    def shapes(self) -> Shapes:
-        """Spheres and capsules of all bodies."""
-        return self.bodies.shapes
+    collision: BodyCollision  # the kernels' tables
 
     @property
     def num_tests(self) -> int:
         """Pairs of shapes that one configuration has: of two bodies, and with obstacles."""
         own = dict(zip(*np.unique(self.shapes.body, return_counts=True), strict=True))
-        between = sum(own[a] * own[b] for a, b in self.bodies.pairs)
+        between = sum(own[a] * own[b] for a, b in self.pairs)
         return int(between + sum(own.values()) * len(self.obstacles.kind))
 
     def clearance(self, q: FloatArray) -> Clearances:
@@ -83,6 +82,13 @@ class CoveredCollision(NamedTuple):
     def free_test(self) -> FreeTest:
         """The test of configurations for kernels of other rooms."""
         return self.collision.free_test
+
+
+@dataclass(frozen=True)
+class CoveredCollision(ArmCollision):
+    """Covered bodies of one robot, and the obstacles around it."""
+
+    bodies: BodyModel  # its bodies, covered
 
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""

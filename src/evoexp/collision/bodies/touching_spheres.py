@@ -6,7 +6,8 @@ here.
 """
 
 import itertools
-from typing import Annotated, Any, ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -14,24 +15,17 @@ from pydantic import Field
 from evoexp.collision.bodies.body_collision import (
     BodyCollision,
     Clearances,
-    FreeTest,
+    Shapes,
     contiguous_batch,
 )
-from evoexp.collision.bodies.packing import Shapes
-from evoexp.errors import SettingError
+from evoexp.collision.bodies.covered_bodies import ArmCollision
+from evoexp.errors import demand
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.poses import frame_poses
-from evoexp.scenarios.obstacles import (
-    CAPSULE,
-    CYLINDER,
-    HALF_SPACE,
-    SPHERE,
-    ObstacleTable,
-    obstacle_table,
-)
+from evoexp.robots.kinematics import frame_poses
+from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, HALF_SPACE, SPHERE, obstacle_table
 from evoexp.validation import Component, LayoutCount, Positive
 
 MOST_PER_LINK = 1000  # spheres; every one is tested against those of the other arms
@@ -55,12 +49,9 @@ class TouchingSpheres(Component):
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
         """Return the model of a robot among obstacles, ready for batches."""
-        if any(link.is_tool for link in assembly.links):
-            raise SettingError(
-                "robot",
-                "without tools: circles of one size cannot show them",
-                "tool_radius above 0",
-            )
+        has_tool = any(link.is_tool for link in assembly.links)
+        must = "without tools: circles of one size cannot show them"
+        demand(not has_tool, "robot", must, "tool_radius above 0")
         arms, moving, centers = self._placed(assembly)
         radii = np.full(len(arms), self.sphere_radius)
         # bodies of different arms against each other, and against obstacles
@@ -70,8 +61,8 @@ class TouchingSpheres(Component):
         around = obstacle_table(obstacles).without_ellipses()
         shapes = Shapes(moving, centers, centers, radii, moving)
         collision = BodyCollision.build(assembly.table, shapes, around, between, (), arm_of_joints)
-        counts = np.bincount(arms)
-        return SphereCollision(assembly, self.sphere_radius, shapes, counts, around, collision)
+        about = assembly, shapes, between, around, collision
+        return SphereCollision(*about, self.sphere_radius, np.bincount(arms))
 
     def _placed(self, assembly: Assembly) -> tuple[IntArray, IntArray, FloatArray]:
         """Return arm, joint and centre (3,) of each sphere on the links that move.
@@ -99,21 +90,12 @@ class TouchingSpheres(Component):
         return np.array(arms), np.array(joints, dtype=np.int64), np.array(centers)
 
 
-class SphereCollision(NamedTuple):
+@dataclass(frozen=True)
+class SphereCollision(ArmCollision):
     """Touching spheres on one robot, and the obstacles around it."""
 
-    assembly: Assembly  # the robot
     radius: float  # of every sphere [length unit]
-    shapes: Shapes  # the spheres
     counts: IntArray  # (arms,) spheres of each arm
-    obstacles: ObstacleTable  # the obstacle table
-    collision: BodyCollision  # the kernels' tables
-
-    @property
-    def num_tests(self) -> int:
-        """Pairs of shapes that one configuration has: spheres of two arms, and with obstacles."""
-        between = sum(int(a * b) for a, b in itertools.combinations(self.counts, 2))
-        return between + len(self.shapes.joint) * len(self.obstacles.kind)
 
     def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
@@ -138,15 +120,6 @@ class SphereCollision(NamedTuple):
             )
             outside = np.minimum(outside, distances.min(axis=0))
         return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
-
-    def collides(self, q: FloatArray) -> BoolArray:
-        """Return which configurations (nq, configurations) [deg] collide."""
-        return self.collision.collides(DEGREE * q)
-
-    @property
-    def free_test(self) -> FreeTest:
-        """The test of configurations for kernels of other rooms."""
-        return self.collision.free_test
 
 
 def _signed_distances(kind: int, size: FloatArray, points: FloatArray) -> FloatArray:

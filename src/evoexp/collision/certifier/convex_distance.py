@@ -259,7 +259,6 @@ def _cross(
 
 @inlined
 def _holds(simplex: FloatArray, count: int, x: float, y: float, z: float) -> bool:
-    """Return whether a point is one of the simplex's corners."""
     found = False
     for k in range(count):
         found = found or (simplex[k, 0] == x and simplex[k, 1] == y and simplex[k, 2] == z)

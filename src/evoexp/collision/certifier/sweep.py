@@ -34,25 +34,6 @@ MAX_LEAVES = 100_000
 
 ROUGH_DEPTH = 5  # halvings after which a body known only by its hull is left to coal
 
-LEAST, FIRST, FIRST_PAIR, PROVEN, NODES, LEAVES = range(6)
-"""Places in `Progress.state`; see `Sweep`."""
-
-
-class Sweep(NamedTuple):
-    """The findings of a sweep."""
-
-    least: float  # least upper bound of a distance that was found; inf if none
-    first: float  # t of the first distance at or below a pair's `level`; inf if none
-    first_pair: int  # its pair; −1 if none
-    proven: float  # lower bound of all distances, outside the leaves, before `first`
-    nodes: int  # intervals that were judged
-    done: bool  # false if `max_nodes` were used up
-    leaves: FloatArray  # (leaves, 3) pair, begin, end [instants] of intervals left open
-    # (pairs,) like `least`, pair by pair; where upper bounds are not believed, the least lower
-    # bound at an instant
-    pair_least: FloatArray
-    pair_least_at: FloatArray  # (pairs,) the t of it
-
 
 class Goal(NamedTuple):
     """The question that a sweep answers."""
@@ -70,13 +51,20 @@ class Goal(NamedTuple):
     max_nodes: int  # most intervals to judge
 
 
-class Progress(NamedTuple):
-    """A sweep under way."""
+class Sweep(NamedTuple):
+    """The findings of a sweep, of which those of one number are (1,)."""
 
-    leaves: FloatArray  # (MAX_LEAVES + pairs, 3) see `Sweep`; `state[LEAVES]` of them are there
-    state: FloatArray  # (6,) see the places above
+    least: FloatArray  # least upper bound of a distance that was found; inf if none
+    first: FloatArray  # t of the first distance at or below a pair's `level`; inf if none
+    first_pair: IntArray  # its pair; −1 if none
+    proven: FloatArray  # lower bound of all distances, outside the leaves, before `first`
+    nodes: IntArray  # intervals that were judged
+    num_leaves: IntArray  # intervals left open
+    leaves: FloatArray  # (MAX_LEAVES + pairs, 3) pair, begin, end [instants] of these
+    # (pairs,) like `least`, pair by pair; where upper bounds are not believed, the least lower
+    # bound at an instant
     pair_least: FloatArray
-    pair_least_at: FloatArray
+    pair_least_at: FloatArray  # (pairs,) the t of it
 
 
 class Levels(NamedTuple):
@@ -91,15 +79,19 @@ class Levels(NamedTuple):
     ends: FloatArray  # (DEPTH + 2,) where it ends
 
 
-def sweep_motion(task: Task, goal: Goal, work: Workspace) -> Sweep:
-    """Judge a motion."""
+def sweep_motion(task: Task, goal: Goal, work: Workspace) -> tuple[Sweep, bool]:
+    """Judge a motion; return the findings, and whether `max_nodes` sufficed for all of it."""
     num_pairs = len(task.pairs)
-    state = np.array([goal.known, np.inf, -1.0, np.inf, 0.0, 0.0])
-    found = Progress(
-        np.empty((MAX_LEAVES + num_pairs, 3)),
-        state,
-        np.full(num_pairs, np.inf),
-        np.zeros(num_pairs),
+    found = Sweep(
+        least=np.array([goal.known]),
+        first=np.array([np.inf]),
+        first_pair=np.array([-1]),
+        proven=np.array([np.inf]),
+        nodes=np.array([0]),
+        num_leaves=np.array([0]),
+        leaves=np.empty((MAX_LEAVES + num_pairs, 3)),
+        pair_least=np.full(num_pairs, np.inf),
+        pair_least_at=np.zeros(num_pairs),
     )
     levels = Levels(
         bounds=np.empty((2, num_pairs)),
@@ -111,27 +103,14 @@ def sweep_motion(task: Task, goal: Goal, work: Workspace) -> Sweep:
         ends=np.empty(DEPTH + 2),
     )
     levels.lists[0], levels.counts[0] = np.arange(num_pairs), num_pairs  # of whole segments
-    done = _sweep(task, goal, work, found, levels)
-    return Sweep(
-        state[LEAST],
-        state[FIRST],
-        int(state[FIRST_PAIR]),
-        state[PROVEN],
-        int(state[NODES]),
-        done,
-        found.leaves[: int(state[LEAVES])],
-        found.pair_least,
-        found.pair_least_at,
-    )
+    return found, _sweep(task, goal, work, found, levels)
 
 
 @kernel
-def _sweep(task: Task, goal: Goal, work: Workspace, found: Progress, levels: Levels) -> bool:
-    """Judge a motion; return whether all of it was judged."""
+def _sweep(task: Task, goal: Goal, work: Workspace, found: Sweep, levels: Levels) -> bool:
     task, goal, work, found, levels = borrowed((task, goal, work, found, levels))
-    state, bounds, lists, counts = found.state, levels.bounds, levels.lists, levels.counts
+    bounds, lists, counts = levels.bounds, levels.lists, levels.counts
     begins, ends, depths = levels.begins, levels.ends, levels.depths
-    num_pairs = len(task.pairs)
     if goal.instants:
         _judge_instants(task, goal, work, found)
     for segment in range(len(task.coefficients)):
@@ -144,12 +123,12 @@ def _sweep(task: Task, goal: Goal, work: Workspace, found: Progress, levels: Lev
             # the leftmost interval, up to the first contact known
             waiting -= 1
             a, depth = begins[waiting], depths[waiting]
-            b = min(ends[waiting], state[FIRST] - segment)
-            if state[FIRST] < np.inf and not goal.refine:
+            b = min(ends[waiting], found.first[0] - segment)
+            if found.first[0] < np.inf and not goal.refine:
                 return True
             if a >= b:
                 continue
-            if state[NODES] >= goal.max_nodes or state[LEAVES] + num_pairs > len(found.leaves):
+            if found.nodes[0] >= goal.max_nodes or found.num_leaves[0] > MAX_LEAVES:
                 return False
             if not task.straight:
                 approach_bounds(task.chain, piece, a, b, task.weights, bounds, levels.above)
@@ -173,24 +152,24 @@ def _closely(goal: Goal) -> float:
 
 
 @inlined
-def _judge_instants(task: Task, goal: Goal, work: Workspace, found: Progress) -> None:
+def _judge_instants(task: Task, goal: Goal, work: Workspace, found: Sweep) -> None:
     """Measure all pairs at the instants themselves: a good upper bound from the start."""
-    state, least, at = found.state, found.pair_least, found.pair_least_at
+    least, at = found.pair_least, found.pair_least_at
     for instant in range(int(task.last) + 1):
-        if state[FIRST] < np.inf:
+        if found.first[0] < np.inf:
             return
         segment = min(instant, len(task.coefficients) - 1)
         move_to(task, work, segment, float(instant - segment))
         for pair in range(len(task.pairs)):
-            wanted = max(state[LEAST], goal.level[pair])
+            wanted = max(found.least[0], goal.level[pair])
             low, high = pair_distance(task, work, pair, wanted, -np.inf, _closely(goal))
             distance = high if task.exact[pair] else low
             if distance < least[pair]:
                 least[pair], at[pair] = distance, float(instant)
             if task.exact[pair]:
-                state[LEAST] = min(state[LEAST], high)
-            if task.exact[pair] and high <= goal.level[pair] and state[FIRST] == np.inf:
-                state[FIRST], state[FIRST_PAIR] = float(instant), pair
+                found.least[0] = min(found.least[0], high)
+            if task.exact[pair] and high <= goal.level[pair] and found.first[0] == np.inf:
+                found.first[0], found.first_pair[0] = float(instant), pair
 
 
 @inlined
@@ -198,7 +177,7 @@ def _judge_interval(
     task: Task,
     goal: Goal,
     work: Workspace,
-    found: Progress,
+    found: Sweep,
     segment: int,
     a: float,
     b: float,
@@ -211,23 +190,23 @@ def _judge_interval(
 
     Writes the pairs that must be judged on its halves to `left`, and returns their number.
     """
-    leaves, state, least, at = found.leaves, found.state, found.pair_least, found.pair_least_at
-    state[NODES] += 1.0
+    leaves, least, at = found.leaves, found.pair_least, found.pair_least_at
+    found.nodes[0] += 1
     u, half, count = 0.5 * (a + b), 0.5 * (b - a), 0
     move_to(task, work, segment, u)
     for pair in given:
         # the distance that is to be proven
         way, wanted = bounds[0, pair] * half + goal.rounding, goal.goal[pair]
-        upper = state[LEAST]
+        upper = found.least[0]
         if goal.resolution < np.inf and 0.0 < upper < np.inf:
             wanted = max(wanted, upper - min(max(goal.resolution * upper, goal.floor), 0.5 * upper))
         # the distance in the middle
         low, high = pair_distance(task, work, pair, wanted + way, wanted, _closely(goal))
         if task.exact[pair] and high < least[pair]:
             least[pair], at[pair] = high, segment + u
-            state[LEAST] = min(state[LEAST], high)
-        if task.exact[pair] and high <= goal.level[pair] and segment + u < state[FIRST]:
-            state[FIRST], state[FIRST_PAIR] = segment + u, pair
+            found.least[0] = min(found.least[0], high)
+        if task.exact[pair] and high <= goal.level[pair] and segment + u < found.first[0]:
+            found.first[0], found.first_pair[0] = segment + u, pair
         slack = goal.slack[pair]
         near = (
             way <= 0.25 * slack and low > goal.level[pair] - 0.5 * slack and high > goal.level[pair]
@@ -239,12 +218,12 @@ def _judge_interval(
             bound = max(bound, least_separation(task, work, pair, segment, u, half) - change)
         # proven, left to coal, or left to the halves
         if bound >= wanted or near:
-            state[PROVEN] = min(state[PROVEN], bound)
+            found.proven[0] = min(found.proven[0], bound)
         elif b - a < NARROW or (depth >= ROUGH_DEPTH and not task.exact[pair]):
-            if segment + b < state[FIRST]:
-                leaf = int(state[LEAVES])
+            if segment + b < found.first[0]:
+                leaf = found.num_leaves[0]
                 leaves[leaf, 0], leaves[leaf, 1], leaves[leaf, 2] = pair, segment + a, segment + b
-                state[LEAVES] += 1.0
+                found.num_leaves[0] += 1
         else:
             left[count] = pair
             count += 1

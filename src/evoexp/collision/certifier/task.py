@@ -7,16 +7,17 @@ import numpy as np
 from evoexp.collision.body_table import BodyTable
 from evoexp.collision.certifier.convex_distance import CONVERGED, distance_bounds, support
 from evoexp.collision.motion_bounds import (
-    FRAME,
     joint_frames,
     joint_twists,
+    moved_by_one,
     pair_reaches,
     reaches,
 )
 from evoexp.collision.scene import Scene
 from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.paths.motion import Motion
 from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.robots.kinematics import KinematicChain
+from evoexp.robots.kinematics import SPATIAL_ROWS, KinematicChain
 
 FIRST_STEP = 0.02  # [segments] towards a local minimum
 FINEST = 1e-10  # [segments] the last step is not less
@@ -46,8 +47,8 @@ class Workspace(NamedTuple):
     """The configuration that is looked at, and scratch."""
 
     q: FloatArray  # (nq,)
-    frames: FloatArray  # (joints, FRAME) of the joints
-    world: FloatArray  # (bodies, FRAME) of the bodies
+    frames: FloatArray  # (joints, 12) of the joints
+    world: FloatArray  # (bodies, 12) of the bodies
     # (bodies + 2,) the configuration's number when each body was placed; the last but one when the
     # twists were computed; the last: its number now
     stamps: IntArray
@@ -57,14 +58,34 @@ class Workspace(NamedTuple):
     twists: FloatArray  # (joints, 6) of the joints
 
 
+def motion_task(scene: Scene, motion: Motion) -> Task:
+    """Return the task of a motion; a single instant becomes a segment without movement."""
+    polynomials = motion.polynomials
+    if motion.num_segments == 0:
+        polynomials = np.zeros((1, 4, motion.q.shape[1]))
+        polynomials[0, 0] = motion.q[0]
+    chain, bodies, pairs = scene.table.chain, scene.bodies, scene.pairs
+    return Task(
+        chain,
+        bodies,
+        pairs,
+        bodies.exact[pairs].all(axis=1),
+        np.ascontiguousarray(polynomials),
+        motion.coefficients is None,
+        float(motion.num_segments),
+        approach_weights(chain, bodies, pairs, motion.greatest),
+        moved_by_one(chain, bodies.joint, pairs),
+    )
+
+
 def work_space(task: Task) -> Workspace:
     """Return the workspace of a task; bodies that stand still are in their places."""
     num_joints, bodies = len(task.chain.parent), task.bodies
-    world = np.empty((len(bodies.joint), FRAME))
+    world = np.empty((len(bodies.joint), SPATIAL_ROWS))
     world[:, :9], world[:, 9:] = bodies.rotation, bodies.translation
     return Workspace(
         q=np.zeros(task.coefficients.shape[2]),
-        frames=np.zeros((num_joints, FRAME)),
+        frames=np.zeros((num_joints, SPATIAL_ROWS)),
         world=world,
         stamps=np.zeros(len(bodies.joint) + 2, dtype=np.int64),
         normals=np.ones((len(task.pairs), 3)),
@@ -197,18 +218,7 @@ class LeastDistance:
 
     def __init__(self, scene: Scene) -> None:
         """Take a scene whose bodies are `known`, and its pairs."""
-        num_pairs, num_joints = len(scene.pairs), len(scene.table.chain.parent)
-        self._task = Task(
-            chain=scene.table.chain,
-            bodies=scene.bodies,
-            pairs=scene.pairs,
-            exact=np.ones(num_pairs, dtype=np.bool_),
-            coefficients=np.zeros((1, 4, scene.model.nq)),
-            straight=True,
-            last=0.0,
-            weights=np.zeros((num_pairs, num_joints)),
-            by_one=np.zeros(num_pairs, dtype=np.bool_),
-        )
+        self._task = motion_task(scene, Motion(np.zeros((1, scene.model.nq))))
         self._work = work_space(self._task)
 
     def __call__(self, q: FloatArray) -> FloatArray:
@@ -232,7 +242,6 @@ def known(scene: Scene) -> bool:
 
 @kernel
 def _least_distances(task: Task, work: Workspace, q: FloatArray, least: FloatArray) -> None:
-    """Write the least distance (configurations,) of any pair at each q (configurations, nq)."""
     task, work, q, least = borrowed((task, work, q, least))
     for k in range(len(q)):
         work.stamps[-1] += 1

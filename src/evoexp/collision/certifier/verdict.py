@@ -19,14 +19,8 @@ from evoexp.collision.certifier.coal_distances import (
     walk_down,
 )
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
-from evoexp.collision.certifier.task import (
-    MAX_POLISHED,
-    Task,
-    approach_weights,
-    polish,
-    work_space,
-)
-from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
+from evoexp.collision.certifier.task import MAX_POLISHED, motion_task, polish, work_space
+from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
@@ -87,16 +81,12 @@ def is_clear(scene: Scene, motion: Motion, security_margin: float | FloatArray =
 
 
 class _Candidate(NamedTuple):
-    """A distance that coal measured."""
-
     distance: float
     t: float
     pair: int
 
 
 class _Judgement:
-    """One motion being judged."""
-
     def __init__(
         self,
         scene: Scene,
@@ -113,25 +103,8 @@ class _Judgement:
         self.floor = 1e-6 * scene.size
         self.intervals, self.looked, self.wants_first = 0, False, True
         self.best = _Candidate(np.inf, np.nan, -1)
-        polynomials = motion.polynomials
-        if motion.num_segments == 0:
-            polynomials = np.zeros((1, 4, motion.q.shape[1]))
-            polynomials[0, 0] = motion.q[0]
-        bodies, chain = scene.bodies, scene.table.chain
-        exact = bodies.exact[scene.pairs].all(axis=1)
-        self.all_exact = bool(exact.all())
-        self.task = Task(
-            chain,
-            bodies,
-            scene.pairs,
-            exact,
-            np.ascontiguousarray(polynomials),
-            motion.coefficients is None,
-            float(motion.num_segments),
-            approach_weights(chain, bodies, scene.pairs, motion.greatest),
-            moved_by_one(chain, bodies.joint, scene.pairs),
-        )
-        self.work = work_space(self.task)
+        self.task = motion_task(scene, motion)
+        self.all_exact, self.work = bool(self.task.exact.all()), work_space(self.task)
 
     def verdict(self) -> Verdict:
         """Return the verdict."""
@@ -208,9 +181,8 @@ class _Judgement:
         precision = resolution, self.floor, ROUNDING * self.scene.size
         if measured and not self.all_exact and self.best.pair < 0:
             # coal's distances of meshes where their convex hulls are closest
-            found = sweep_motion(
-                self.task, Goal(*asked, np.inf, *precision, True, refine, 0), self.work
-            )
+            question = Goal(*asked, np.inf, *precision, True, refine, 0)
+            found, _ = sweep_motion(self.task, question, self.work)
             pairs = np.flatnonzero(~self.task.exact)
             for pair in pairs[np.argsort(found.pair_least[pairs], kind="stable")][:MAX_POLISHED]:
                 t = found.pair_least_at[pair]
@@ -219,13 +191,13 @@ class _Judgement:
             known, left = self.best.distance, MOST_INTERVALS - self.intervals
             instants = measured and not (self.looked and refine)
             question = Goal(*asked, known, *precision, instants, refine, left)
-            found = sweep_motion(self.task, question, self.work)
+            found, done = sweep_motion(self.task, question, self.work)
             self.looked = True
-            self.intervals += found.nodes
+            self.intervals += int(found.nodes[0])
             contact = None
-            if found.first < np.inf:
-                pair = found.first_pair
-                near = min(found.first, self.task.last)
+            if found.first[0] < np.inf:
+                pair = int(found.first_pair[0])
+                near = min(float(found.first[0]), self.task.last)
                 t = first_contact(self.coal, pair, near, level[pair], self.wants_first)
                 if t is None:  # coal sees no contact there: coal alone judges this pair
                     self.task.exact[pair] = self.all_exact = self.looked = False
@@ -233,7 +205,7 @@ class _Judgement:
                 contact = _Candidate(level[pair], t, pair)
             self.sweep = found
             earlier, proven = self._search_leaves(found, contact, resolution, goal, level)
-            return earlier, proven if found.done else -np.inf
+            return earlier, proven if done else -np.inf
 
     def _search_leaves(
         self,
@@ -244,10 +216,8 @@ class _Judgement:
         level: FloatArray,
     ) -> tuple[_Candidate | None, float]:
         """Have coal settle the leaves, from left to right up to the first contact."""
-        proven = found.proven
-        if len(found.leaves) == 0:
-            return contact, proven
-        for pair, begin, end in _joined(found.leaves):
+        proven, leaves = float(found.proven[0]), found.leaves[: found.num_leaves[0]]
+        for pair, begin, end in _joined(leaves) if len(leaves) else ():
             if contact is not None and (begin >= contact.t or not self.wants_first):
                 break  # later leaves do not matter, or any contact is an answer
             task, p = self.task, int(pair)
@@ -255,7 +225,7 @@ class _Judgement:
             speeds, scratch = np.empty((2, len(task.pairs))), np.empty(len(task.chain.parent))
             piece, u, v = task.coefficients[segment], begin - segment, end - segment
             approach_bounds(task.chain, piece, u, v, task.weights, speeds, scratch)
-            known = min(self.best.distance, found.least)
+            known = min(self.best.distance, float(found.least[0]))
             asked = goal[p], level[p], self.tolerances[p], known, resolution, self.floor
             goals = LeafGoals(*asked, self.wants_first)
             end = min(end, float(self.motion.num_segments))
@@ -267,9 +237,8 @@ class _Judgement:
         return contact, proven
 
     def _polish(self) -> None:
-        """Walk down to local minima of the pairs that came closest."""
-        found = self.sweep
-        worth = found.least + max(self.resolution * found.least, self.floor)
+        found, least = self.sweep, float(self.sweep.least[0])
+        worth = least + max(self.resolution * least, self.floor)
         self._polish_from(found.pair_least, found.pair_least_at, worth)
         if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
             distance, t = self.best.distance, self.best.t
@@ -318,7 +287,6 @@ def _joined(leaves: FloatArray) -> FloatArray:
 
 
 def _check(scene: Scene, motion: Motion, security_margin: float | FloatArray) -> None:
-    """Check that the motion fits the model and that every number is in its range."""
     nq = scene.model.nq
     if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
         raise ValueError(f"motion: q must have shape (instants, {nq}), was {motion.q.shape}")

@@ -11,18 +11,16 @@ points below their edges. Against a plane, whatever the body's tilt, free points
 overlaps by no more than the allowed depth; the exact verdict has the last word.
 """
 
-import contextlib
 import json
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.body_table import UnsupportedShape
+from evoexp.collision.body_table import UnsupportedShape, geometry_key
 from evoexp.collision.box_support import coal, corners_of
 from evoexp.collision.covers.solid_balls import Balls, Solid, solid_of, varied_spheres
-from evoexp.collision.geometry_key import geometry_key
-from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import cache_root, kept
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
@@ -114,12 +112,10 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
 
 
 def _half_axis(shape: Any) -> float:
-    """Return half the length of the axis of a capsule; 0 of a ball."""
     return float(shape.halfLength) if isinstance(shape, coal.Capsule) else 0.0
 
 
 def _ends(half: float) -> tuple[FloatArray, FloatArray]:
-    """Return both ends (1, 3) of an axis along z."""
     return np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
 
 
@@ -285,12 +281,11 @@ def kept_sphere_cover(item: Any, inflation: float) -> Cover:
     """Return the cover of `sphere_cover`, from where it is kept if it was found before."""
     if isinstance(item.geometry, coal.Sphere | coal.Capsule):
         return sphere_cover(item, inflation)
+
+    def found() -> bytes:
+        *arrays, reach, _ = sphere_cover(item, inflation)
+        return json.dumps([*(array.tolist() for array in arrays), float(reach)]).encode()
+
     path = cache_root() / "covers" / geometry_key([item], inflation)
-    with contextlib.suppress(FileNotFoundError, Damaged):
-        start, end, radius, reach = json.loads(read_kept(path))
-        return Cover(np.array(start), np.array(end), np.array(radius), reach)
-    found = sphere_cover(item, inflation)
-    start, end, radius = (array.tolist() for array in found[:3])
-    with contextlib.suppress(OSError):
-        write_kept(path, json.dumps([start, end, radius, float(found.inflation)]).encode())
-    return found
+    start, end, radius, reach = json.loads(kept(path, found))
+    return Cover(np.array(start), np.array(end), np.array(radius), reach)

@@ -135,7 +135,6 @@ def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
 
 
 def _coal_distance(points: FloatArray, shape: Any) -> FloatArray:
-    """Return the distances of points from a body as coal has them."""
     here, ball = coal.Transform3s(), coal.Sphere(1e-9)
     places = (coal.Transform3s(np.eye(3), point) for point in points)
     return np.array([distance(ball, place, shape, here) for place in places])

@@ -8,10 +8,10 @@ envelopes:
   each arm 1 and each block of eight arms 2 reach toward each other: where they end before they
   meet, no arm of the block can touch. That spares four of five tests of an arm and a block, at the
   price of a load and a comparison each, or once for eight arms and a block.
-- The others are tested one arm against a block, as `segment_predicates` says.
+- The others are tested one arm against a block, as `meeting` of `planar_arms` says.
 
 So counts are the same whatever the vector width: lines and circles nearer than
-`segment_predicates.contact_tolerance` touch, parallel, collinear and vanishing ones, too.
+`planar_arms.contact_tolerance` touch, parallel, collinear and vanishing ones, too.
 """
 
 import math
@@ -20,15 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.planar.planar_arms import POINT_ROWS, Arm, tolerance_of
-from evoexp.collision.planar.segment_predicates import (
+from evoexp.collision.planar.planar_arms import (
+    POINT_ROWS,
+    Arm,
     Line,
     meeting,
     sign_product,
     squared_distance,
+    tolerance_of,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
     Mask,
@@ -41,6 +42,7 @@ from evoexp.numeric.vectors import (
     select,
     spread,
     store,
+    transposed,
     upper,
 )
 from evoexp.records import FloatArray, IntArray
@@ -277,7 +279,6 @@ def _vectors(two: Population, at: np.uint64) -> Line:
 
 @inlined
 def _links_touch(one: Links, two: Links, bounds: Bounds) -> Mask:
-    """Return whether a line of one arm meets one of another."""
     (first, second), (third, fourth) = one, two
     least = lower(sign_product(first, third), sign_product(first, fourth))
     least = lower(least, lower(sign_product(second, third), sign_product(second, fourth)))
@@ -339,7 +340,6 @@ def _shifted(line: Line, cosine: Number, sine: Number, shift: float) -> Line:
 def _meets_circle(
     lines: Links, center: tuple[Number, Number], radius: float, tolerance: float
 ) -> Mask:
-    """Return whether a line of an arm meets a circle."""
     one = squared_distance(lines[0], center[0], center[1])
     two = squared_distance(lines[1], center[0], center[1])
     return _is_near(lower(one, two), radius, tolerance)

@@ -7,12 +7,15 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.body_collision import BodyCollision, Shapes
 from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
-from evoexp.collision.planar.planar_arms import Arm, largest_coordinate, path_configurations
-from evoexp.collision.planar.segment_predicates import contact_tolerance
-from evoexp.errors import SettingError
+from evoexp.collision.planar.planar_arms import (
+    Arm,
+    contact_tolerance,
+    largest_coordinate,
+    path_configurations,
+)
+from evoexp.errors import demand
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
@@ -131,12 +134,10 @@ def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
     links = [link for link in assembly.links if not link.is_tool]
     is_straight = not any(link.start.any() or link.end[1:].any() for link in links)
     is_flat = assembly.table.planar and not assembly.table.chain.turned.any()
-    if not (is_flat and is_straight and all(stop - first == 2 for first, stop in slices)):
-        raise SettingError(
-            "robot",
-            "planar arms of two links with base_angle 0",
-            ", ".join(f"{stop - first} joints" for first, stop in slices),
-        )
+    are_two = all(stop - first == 2 for first, stop in slices)
+    must = "planar arms of two links with base_angle 0"
+    was = ", ".join(f"{stop - first} joints" for first, stop in slices)
+    demand(is_flat and is_straight and are_two, "robot", must, was)
     arms = []
     for first, stop in slices:
         x, y, _ = assembly.table.chain.translation[first]

@@ -7,15 +7,20 @@ lie between another's two lines unnoticed, as in the paper.
 
 Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, of the second x, y.
 Lines need the first four rows only.
+
+Ends of links are sums of rounded sines, so links that touch, or lie on one line, may come out a few
+units in the last place apart (sin 45° and sin 135° differ by one). `meeting` therefore counts what
+is at most a tolerance apart as contact; `contact_tolerance` bounds that rounding, and exceeds that
+of the sides in `meeting`: where a side is in doubt, an end is nearer to a line than the tolerance.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.segment_predicates import contact_tolerance, meeting
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.elementary import exact_sincos
+from evoexp.numeric.vectors import Mask, Number, lower, select, upper
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.kinematics import U
 
@@ -23,6 +28,11 @@ Point = tuple[float, float]
 
 POINT_ROWS, OUTLINE_ROWS = 4, 8
 PARALLEL = 1e-12  # [-] links are parallel up to this sine of the angle between them
+Line = tuple[Number, Number, Number, Number]
+"""Both ends of a segment, x and y: of one arm (numbers) or of eight (vectors)."""
+
+ROUNDING = 2.0**-46
+"""`contact_tolerance` of coordinates up to 1 [-]."""
 
 
 class Arm(NamedTuple):
@@ -135,7 +145,12 @@ class ClosedForm(NamedTuple):
     # where parallel
     mu: FloatArray
     nu: FloatArray  # (4, n) the same on the link of arm 2
-    crossing: BoolArray  # (4, n) whether the links have a point in common
+
+    @property
+    def crossing(self) -> BoolArray:
+        """(4, n) whether the links have a point in common, up to rounding; not if parallel."""
+        mu, nu = self
+        return np.asarray((mu >= 0.0) & (mu <= 1.0) & (nu >= 0.0) & (nu <= 1.0))
 
 
 def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedForm:
@@ -148,8 +163,8 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
 
     where each product is a sine of a difference of two angles times two lengths; for i = j = 2 and
     equal lengths this is Eq. 12. The paper counts mu, nu in (0, 1]; here in [0, 1]: a link has two
-    ends. The formula is rounded, and says nothing of parallel links: whether links cross is decided
-    as by `count_collisions`.
+    ends. The formula is rounded, and says nothing of parallel links: searches count crossings by
+    `count_collisions`.
 
     Args:
         one: Arm 1.
@@ -173,9 +188,7 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
         skew = np.abs(across) > PARALLEL * (one.lengths[i] * two.lengths[j])
         np.divide(_cross(w, v), across, out=mu[pair], where=skew)
         np.divide(_cross(w, u), across, out=nu[pair], where=skew)
-    crossing = np.empty(mu.shape, dtype=np.bool_)
-    _write_crossings(joints_1, joints_2, tolerance_of(one, two), crossing)
-    return ClosedForm(mu, nu, crossing)
+    return ClosedForm(mu, nu)
 
 
 def _joints(arm: Arm, q: FloatArray) -> FloatArray:
@@ -189,13 +202,70 @@ def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
 
 
 @kernel
-def _write_crossings(
-    one: FloatArray, two: FloatArray, tolerance: float, crossing: BoolArray
-) -> None:
-    """Write whether links cross, from the joints (3, 2, n) of both arms."""
-    for pair in range(4):
-        i, j = pair // 2, pair % 2
-        for n in range(crossing.shape[1]):
-            (ax, ay), (bx, by) = one[i, :, n], one[i + 1, :, n]
-            (cx, cy), (dx, dy) = two[j, :, n], two[j + 1, :, n]
-            crossing[pair, n] = meeting((ax, ay, bx, by), (cx, cy, dx, dy), tolerance)
+def contact_tolerance(size: float) -> float:
+    """Return the distance up to which rounding cannot tell two planar arms from touching ones.
+
+    With u = 2^-53, and angles within ±π, the computed end of a link is off by at most 46 u · size:
+
+    - angles by 40 u: 2 π u from degrees to radians, 3 π u between two configurations, 24 u where
+      the end-effector's place is given (two arctangents and an arccosine);
+    - sine and cosine by 1.2 u each, their multiples and the sums of them by 4 u.
+
+    Two arms are thus off by 92 u · size against each other, and the distance of two segments is
+    rounded by less than 20 u · size: 128 u · size = 2^-46 · size exceed both. What touches in exact
+    arithmetic always counts; what is more than twice the tolerance apart never does.
+
+    Args:
+        size: Greatest coordinate that an end can have, and that of an obstacle, if it is one
+            [length unit].
+    """
+    return ROUNDING * size
+
+
+@inlined
+def meeting(one: Line, two: Line, tolerance: float) -> Mask:
+    """Return whether two segments cross, or are at most `tolerance` apart.
+
+    They cross if the ends of each lie on both sides of the other's line. Segments on one line have
+    rounded sides; those that do not touch are told apart by the boxes around them.
+    """
+    (ax, ay, bx, by), (cx, cy, dx, dy) = one, two
+    overlap = (lower(ax, bx) <= upper(cx, dx)) & (lower(cx, dx) <= upper(ax, bx))
+    overlap = overlap & (lower(ay, by) <= upper(cy, dy)) & (lower(cy, dy) <= upper(ay, by))
+    crossing = overlap & _parts(one, two) & _parts(two, one)
+    # segments that do not cross are nearest to each other at an end
+    least = lower(
+        lower(squared_distance(one, cx, cy), squared_distance(one, dx, dy)),
+        lower(squared_distance(two, ax, ay), squared_distance(two, bx, by)),
+    )
+    return crossing | (least <= tolerance * tolerance)
+
+
+@inlined
+def _parts(line: Line, other: Line) -> Mask:
+    """Return whether the ends of the other lie on different sides of a line."""
+    (ax, ay, bx, by), (cx, cy, dx, dy) = line, other
+    ux, uy = bx - ax, by - ay
+    one = ux * (cy - ay) - uy * (cx - ax)
+    two = ux * (dy - ay) - uy * (dx - ax)
+    return ((one > 0.0) & (two < 0.0)) | ((one < 0.0) & (two > 0.0))
+
+
+@inlined
+def squared_distance(line: Line, x: Number, y: Number) -> Number:
+    """Return the squared distance of the point (x, y) from a segment, rounded."""
+    ax, ay, bx, by = line
+    ux, uy, vx, vy = bx - ax, by - ay, x - ax, y - ay
+    squared, along = ux * ux + uy * uy, ux * vx + uy * vy
+    t = lower(upper(along / select(squared > 0.0, squared, 1.0), 0.0), 1.0)
+    vx, vy = vx - t * ux, vy - t * uy
+    return vx * vx + vy * vy
+
+
+@inlined
+def sign_product(one: Line, two: Line) -> Number:
+    """Return a number < 0 if the ends of each segment are on both sides of the other, else ≥ 0."""
+    (ax, ay, bx, by), (cx, cy, dx, dy) = one, two
+    ux, uy, vx, vy, x, y = bx - ax, by - ay, dx - cx, dy - cy, cx - ax, cy - ay
+    first, second, across = ux * y - uy * x, vx * y - vy * x, ux * vy - uy * vx
+    return upper(first * (first + across), second * (second + across))

@@ -40,7 +40,7 @@ from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
-from evoexp.robots.floor_platform import FloorPlatform
+from evoexp.robots.mobile_robots import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 

@@ -31,7 +31,7 @@ from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.mobile_arm import MobileArm
+from evoexp.robots.mobile_robots import MobileArm
 from evoexp.scenarios.motion_tasks import Docking
 from evoexp.validation import Component, Limits
 

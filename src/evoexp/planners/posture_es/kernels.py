@@ -25,8 +25,7 @@ from evoexp.objectives.posture_cost import (
     rate_poses,
 )
 from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.robots.kinematics import KinematicChain
-from evoexp.robots.poses import frame_poses
+from evoexp.robots.kinematics import KinematicChain, frame_poses
 
 COST = len(TERMS)
 ROWS = COST + 1  # the terms, then the cost

@@ -20,7 +20,7 @@ from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, pose_of
+from evoexp.robots.kinematics import IDENTITY, compose, frame_pose, invert, pose_of
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, obstacle_hulls
 from evoexp.scenarios.posture_task import (
     Phase,

@@ -24,7 +24,7 @@ from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.robots.poses import local_pose
+from evoexp.robots.kinematics import local_pose
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
 from evoexp.scenarios.posture_task import (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.ellipse_kernels import (
+from evoexp.collision.planar.link_ellipses import (
     Ellipses,
     PathChecks,
     TestedPath,

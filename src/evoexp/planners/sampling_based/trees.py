@@ -8,8 +8,7 @@ import itertools
 
 import numpy as np
 
-from evoexp.collision.bodies.covered_bodies import CoveredCollision
-from evoexp.collision.bodies.touching_spheres import SphereCollision
+from evoexp.collision.bodies.covered_bodies import ArmCollision
 from evoexp.collision.planar.link_ellipses import EllipseCollision
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import (
@@ -31,7 +30,7 @@ class EdgeTest:
 
     def __init__(
         self,
-        collision: SphereCollision | CoveredCollision | EllipseCollision,  # the model
+        collision: ArmCollision | EllipseCollision,  # the model
         resolution: float,  # greatest distance of configurations that are tested [deg]
         # judge the edges of paths that the model calls free; None: the model is trusted
         proofs: Proofs | None = None,

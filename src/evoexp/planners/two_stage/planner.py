@@ -24,7 +24,7 @@ from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Best, Block, FloatArray
-from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
+from evoexp.robots.mobile_robots import ARM_JOINTS, FloorManipulator
 from evoexp.scenarios.motion_tasks import Mission
 from evoexp.validation import Component
 
@@ -167,7 +167,7 @@ class TwoStage(PlannerDefaults, Component):
         if posture is None:
             return None
         place = np.vstack([nodes, *[self.docking_place(problem, angles)] * 2])
-        q = np.empty((len(place), NUM_JOINTS))
+        q = np.empty((len(place), 2 + ARM_JOINTS))
         q[:, :2], q[:, 2:] = place, DEGREE * np.array(problem.scenario.travel_posture)
         q[-1, 2:] = posture.q[0, 1:]
         return Motion(q)

@@ -21,7 +21,7 @@ import pandas as pd
 
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition
-from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import cache_root, read_kept, write_kept
 from evoexp.numeric.kernel_folders import sources_key
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
@@ -71,8 +71,8 @@ def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame
         key = hashlib.sha256(code)
         key.update(f"{condition.condition.id} {log.content_digest}".encode())
         places[path] = cache_root() / "answers" / key.hexdigest()[:32]
-        with contextlib.suppress(FileNotFoundError, Damaged):
-            kept[path] = json.loads(read_kept(places[path]))
+        if (content := read_kept(places[path])) is not None:
+            kept[path] = json.loads(content)
     # a log alone is enough for a worker, which loads pinocchio before it judges
     unjudged = [path for _, _, path in logs if path not in kept]
     parallel = joblib.Parallel(n_jobs=-1 if len(unjudged) >= WORTH_WORKERS else 1)

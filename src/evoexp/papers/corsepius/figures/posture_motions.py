@@ -23,7 +23,7 @@ from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import median_replicate, solved
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED
-from evoexp.robots.poses import frame_pose
+from evoexp.robots.kinematics import frame_pose
 
 LINK, OBSTACLE, HELD, TIP, GOAL = "link", "obstacle", "held", "tip", "goal"
 PLACE, PATH = ["x", "y", "z"], ["x_end", "y_end", "z_end"]

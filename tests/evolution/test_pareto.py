@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.pareto import pareto_front
+from evoexp.evolution.succession import pareto_front
 
 VALUES = st.sampled_from([0.0, -0.0, 1.0, 2.0, 3.0, np.inf, -np.inf, np.nan])
 TABLES = st.integers(1, 6).flatmap(

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.evolution.best_team import best_team
-from evoexp.evolution.hall_of_fame import gather_teams, rate_team
+from evoexp.evolution.teams import best_team, gather_teams, rate_team
 from references.curkovic_numpy import Judged, formed
 
 NOTHING: Any = None

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.objectives.placement_criteria import PlacementCriteria
-from evoexp.objectives.placement_kernels import Model, Task
+from evoexp.objectives.placement_criteria import Model, PlacementCriteria, Task
 from references.placement_numpy import LENGTHS, pinocchio_posture
 
 ANYTHING = np.array([[-np.inf, np.inf]] * 6)

@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.references.placement_conventional import slide
-from evoexp.references.placement_optimum import lowest
 from evoexp.references.placement_programme import (
     MARGINS,
     TORQUE_BOUNDS,
@@ -15,6 +13,7 @@ from evoexp.references.placement_programme import (
     Programme,
     directions_of,
 )
+from evoexp.references.placement_references import lowest, slide
 from references import placement_complex as slow
 from references.placement_samples import LABELS, problem
 

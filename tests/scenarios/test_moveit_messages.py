@@ -11,7 +11,7 @@ import yaml
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.planners.moveit_tasks import links_of_bodies, with_allowed_pairs
+from evoexp.planners.arm_tasks import links_of_bodies, with_allowed_pairs
 from evoexp.scenarios.moveit_files import FIELDS, REQUEST, SCENE
 from evoexp.testing import conditions
 from moveit_samples import (

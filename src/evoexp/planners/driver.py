@@ -7,8 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.evolution.genetic_settings import PopulationSettings, ScaledGenetic
-from evoexp.evolution.operators.breeding import Breeding, Operators
+from evoexp.evolution.operators.breeding import (
+    Breeding,
+    Operators,
+    PopulationSettings,
+    ScaledGenetic,
+)
 from evoexp.evolution.operators.operator import Genome
 from evoexp.evolution.scaled_selection import SelectionMemory
 from evoexp.numeric.elementary import standard_normal

@@ -14,7 +14,7 @@ from scipy import optimize
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.objectives.placement_kernels import Model
+from evoexp.objectives.placement_criteria import Model
 from evoexp.records import FloatArray
 
 INSIDE = 1e-11  # [rad], of torques [-]: on a limit, in spite of rounding, is within it

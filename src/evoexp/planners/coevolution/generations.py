@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.evolution.best_team import BestTeam, best_team
-from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.operators.operator import Genome
 from evoexp.evolution.succession import choose_elites, copy_members
+from evoexp.evolution.teams import BestTeam, Hall, HallRules, best_team
 from evoexp.numeric.compilation import kernel
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,

@@ -10,12 +10,17 @@ import numpy as np
 
 from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
 from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
-from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
-from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.hall_of_fame import Hall, HallRules, rate_team, renew_hall
 from evoexp.evolution.operators.breeding import Breeding
-from evoexp.evolution.pareto import pareto_front
-from evoexp.evolution.succession import choose_elites
+from evoexp.evolution.succession import choose_elites, cost_statistics, pareto_front
+from evoexp.evolution.teams import (
+    CollisionCounts,
+    Hall,
+    HallRules,
+    best_team,
+    pair_index,
+    rate_team,
+    renew_hall,
+)
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions

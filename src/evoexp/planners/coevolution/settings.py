@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
-from evoexp.evolution.genetic_settings import PopulationSettings
-from evoexp.evolution.operators.breeding import Operators
+from evoexp.evolution.operators.breeding import Operators, PopulationSettings
 from evoexp.evolution.operators.crossover import OnePoint
 from evoexp.evolution.operators.mutation import AlleleMutation
 from evoexp.evolution.operators.operator import Crossover, Mutation, Named, Selection

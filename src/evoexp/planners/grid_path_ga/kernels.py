@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
+from evoexp.evolution.succession import summarise
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
 from evoexp.paths.grid_walks import measure_path

@@ -18,7 +18,7 @@ from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Part, Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.operators.breeding import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all

@@ -17,16 +17,28 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
+from evoexp.evolution.operators.breeding import ScaledGenetic
+from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
+from evoexp.evolution.succession import summarise
+from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.placement_criteria import PlacementCriteria
-from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
+from evoexp.numeric.random_stream import Block as Uniforms
+from evoexp.numeric.random_stream import draw_many, used_up
+from evoexp.objectives.placement_criteria import (
+    COST,
+    CRITERIA,
+    PLATFORM,
+    THETA_3,
+    TORQUE,
+    Model,
+    PlacementCriteria,
+    Task,
+    measure_postures,
+)
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
-from evoexp.planners.placement_ga import kernels
-from evoexp.planners.placement_ga.kernels import GENES, ROWS, Coding, Population
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
@@ -35,11 +47,76 @@ from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
 from evoexp.validation import Component, Limits
 
+GENES = 2  # θ1, θ2
+ROWS = GENES + CRITERIA + 1  # angles [deg], criteria, branch of θ3
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
 PER_CALL = 16  # generations; see `ScaledSearch`: another number needs another revision
 BLOCK = 8192  # uniform numbers drawn at once, at least
+
+
+class Coding(NamedTuple):
+    """The meaning of strings, and settings of the operators."""
+
+    bits: int  # bits per gene
+    gray: bool  # whether they are Gray codes
+    limits: FloatArray  # (2, 2) of the angles [deg]
+    multiple: float  # copies that the best one expects, in units of the mean
+    crossover_rate: float  # probability per pair
+    mutation_rate: float  # probability per bit
+
+
+class Population(NamedTuple):
+    """One generation; or all of several, with a first axis of places."""
+
+    strings: IntArray  # (2, individuals)
+    rows: FloatArray  # (ROWS, individuals)
+
+
+@kernel
+def advance(
+    draws: Uniforms,
+    coding: Coding,  # the meaning of strings, and settings of the operators
+    model: Model,  # task, weights and limits of the criteria
+    population: Population,
+    following: Population,  # written
+    chosen: SelectionMemory,  # parents and elites, written
+) -> bool:
+    """Write the population that follows another: its offspring, then the elites, best first.
+
+    Returns whether the draws sufficed; if not, what is written is not complete.
+    """
+    draws, coding, model, population, following, chosen = borrowed(
+        (draws, coding, model, population, following, chosen)
+    )
+    strings, rows, children = population.strings, population.rows, following.strings
+    parents, elites, bits, count = chosen.parents, chosen.elites, coding.bits, len(chosen.parents)
+    if not choose_parents(draws, rows[GENES + COST], coding.multiple, chosen):
+        return False
+    crossing = draw_many(draws, 2 * (count // 2))
+    if used_up(draws):
+        return False
+    # crossover, mutation, criteria
+    cross_strings(crossing, strings, bits, parents, coding.crossover_rate, children)
+    flip_strings(draws, children, bits, count, coding.mutation_rate)
+    if used_up(draws):
+        return False
+    judge(children, coding, model, count, following.rows)
+    # elites
+    for e in range(len(elites)):
+        for gene in range(GENES):
+            children[gene, count + e] = strings[gene, elites[e]]
+        for row in range(ROWS):
+            following.rows[row, count + e] = rows[row, elites[e]]
+    return True
+
+
+@kernel
+def judge(strings: IntArray, coding: Coding, model: Model, count: int, rows: FloatArray) -> None:
+    """Decode and measure the first individuals: fill their rows."""
+    decode_strings(strings[:, :count], coding.bits, coding.gray, coding.limits, rows[:GENES])
+    measure_postures(rows[:GENES], count, model, rows[GENES:])
 
 
 class Problem(NamedTuple):
@@ -109,7 +186,7 @@ class PlacementGa(PlannerDefaults, Component):
     def _judged(self, problem: Problem, population: np.ndarray) -> FloatArray:
         rows = np.empty((ROWS, population.shape[1]))
         strings = np.ascontiguousarray(population, dtype=np.int64)
-        kernels.judge(strings, self.strings_of(problem), problem.model, population.shape[1], rows)
+        judge(strings, self.strings_of(problem), problem.model, population.shape[1], rows)
         return rows
 
     def strings_of(self, problem: Problem) -> Coding:
@@ -176,13 +253,13 @@ class _Search(ScaledSearch):
         """Draw and judge the initial population."""
         strings, rows = present = self.at(0)
         strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
-        kernels.judge(strings, *self._judging, strings.shape[1], rows)
+        judge(strings, *self._judging, strings.shape[1], rows)
         self.note(present, 0)
 
     def breed(self, present: Population, following: Population) -> bool:
         """Write the population that follows another."""
         draws, chosen = self.draws.block, self.chosen
-        return bool(kernels.advance(draws, *self._judging, present, following, chosen))
+        return bool(advance(draws, *self._judging, present, following, chosen))
 
     def note(self, population: Population, place: int) -> None:
         """Summarise a generation at a place."""

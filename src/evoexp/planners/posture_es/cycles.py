@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import model_validator
 
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.succession import cost_statistics
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import COST, Members, Memory, Strategy

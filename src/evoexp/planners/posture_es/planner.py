@@ -24,13 +24,12 @@ from pydantic import BeforeValidator, Field
 from evoexp.collision.bodies.body_models import CollisionModel
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part
-from evoexp.evolution.cost_statistics import CostStatistics
+from evoexp.evolution.succession import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing, in_shape, of_postures
-from evoexp.planners.arm_tasks import cover_shapes
-from evoexp.planners.moveit_tasks import hull_notes
+from evoexp.planners.arm_tasks import cover_shapes, hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
 from evoexp.planners.posture_es.cycles import Node, Search, StrategySettings
 from evoexp.planners.posture_es.kernels import COST

@@ -17,9 +17,8 @@ from evoexp.collision.planar.ellipse_kernels import (
     prepare_checks,
 )
 from evoexp.evolution.bit_coding import decode_bits
-from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.succession import choose_elites, copy_members
+from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import measure_reach

@@ -4,8 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field
 
-from evoexp.evolution.genetic_settings import PopulationSettings
-from evoexp.evolution.operators.breeding import Operators
+from evoexp.evolution.operators.breeding import Operators, PopulationSettings
 from evoexp.evolution.operators.crossover import (
     ArithmeticCrossover,
     BlxAlpha,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.succession import summarise
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.driver import GeneticSearch, generations_per_call

@@ -9,9 +9,8 @@ import numpy as np
 
 from evoexp.collision.bodies.body_tables import FlatTables
 from evoexp.collision.bodies.clearance_kernels import least_clearances
-from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.succession import choose_elites, copy_members
+from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh

@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
-from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.succession import summarise
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk_strings
@@ -21,7 +21,6 @@ from evoexp.planners.driver import GeneticSearch, generations_per_call
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga import kernels
-from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.records import Best, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ class Problem(ArmProblem):
 class Strings:
     """The population-wide steps of one planner on one problem."""
 
-    def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
+    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
         self.planner, self.problem = planner, problem
         self.is_covered = isinstance(problem.collision, CoveredCollision)
         low, high = problem.limits.T if self.is_covered else (-np.inf, np.inf)

@@ -1,24 +1,51 @@
-"""Inverse kinematics in the loop of Lavoie & Boudreau 2001: the damped pseudoinverse, many starts.
+"""The loop of Lavoie & Boudreau 2001 with uniform draws or descents in place of evolution."""
 
-The paper compares its algorithm by way of others with the pseudoinverse method (section 6); damped
-least squares of Nakamura & Hanafusa 1986 stand for that.
-"""
-
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import field_validator
 
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.generator_state import state_bytes
+from evoexp.planners.planner import WrappedPlanner
+from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.sequential_search import SequentialSearch
+from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.planners.redundant_ga.settings import RealGenetic
 from evoexp.planners.redundant_ga.sub_path import DrawnSearch
-from evoexp.records import FloatArray
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import PlanarArm, bring_tip_to
 from evoexp.scenarios.pick_and_place import PickAndPlace
+from evoexp.validation import Component
+
+
+class SequentialSearch(WrappedPlanner):
+    """Searches SP1, then SP2, by uniform draws; everything but the operators is as in the planner.
+
+    Every generation is drawn anew, and the best individual drawn so far ends the sub-path. (Random
+    search draws both sub-paths at once and must succeed in both with one draw.)
+    """
+
+    component: ClassVar[str] = "sequential_search"
+
+    search: ClassVar[type[DrawnSearch]] = DrawnSearch
+
+    planner: RedundantGa  # the planner whose loop, sampling and budget are used
+
+    @field_validator("planner", mode="before")
+    @classmethod
+    def _planner_fits(cls, planner: Any) -> Any:
+        if isinstance(planner, Component) and not isinstance(planner, RedundantGa):
+            must = f"redundant_ga, whose sub-paths {cls.component} draws"
+            raise SettingError("planner", must, planner.component)
+        return planner
+
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield the generations of all draws; their indices go on counting."""
+        return self.planner.search_in_turn(problem, rng, self.search)
 
 
 @kernel
@@ -63,7 +90,8 @@ class InverseKinematics(SequentialSearch):
     """Searches SP1, then SP2, by damped least squares from many postures; one may be enough.
 
     An evaluation is a posture that is judged, wherever its descent ended. The steps of the descent
-    count as none: compare CPU time, too.
+    count as none: compare CPU time, too. The paper compares its algorithm by way of others with the
+    pseudoinverse method (section 6); damped least squares of Nakamura & Hanafusa 1986 stand for it.
     """
 
     component: ClassVar[str] = "inverse_kinematics"

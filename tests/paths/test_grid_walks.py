@@ -7,8 +7,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
-from evoexp.paths.grid_walks import LANES, WORDS, walk, walk_all, weigh_all
-from evoexp.paths.grids import UNREACHED, Moves, front, grid
+from evoexp.paths.grids import (
+    LANES,
+    UNREACHED,
+    WORDS,
+    Moves,
+    front,
+    grid,
+    walk,
+    walk_all,
+    weigh_all,
+)
 from matrix import num_cases
 from references.chen_python import without_loops
 

@@ -13,6 +13,7 @@ from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outline
 from evoexp.evolution.operators.breeding import Breeding
 from evoexp.evolution.succession import choose_elites, cost_statistics, pareto_front
 from evoexp.evolution.teams import (
+    BestTeam,
     CollisionCounts,
     Hall,
     HallRules,
@@ -40,13 +41,12 @@ class Evaluated(NamedTuple):
     blocked: IntArray  # (robots, individuals) configurations that collide with obstacles
 
     @classmethod
-    def room(cls, *shape: int) -> Self:
-        """Return memory for populations of a shape (…, robots, individuals)."""
-        *places, robots, count = shape
-        own, costs = np.empty((2, *shape))
-        pairs = np.empty((*places, robots * (robots - 1) // 2, count, count), dtype=np.int16)
-        blocked = np.zeros(shape, dtype=np.int64)
-        return cls(costs, np.empty((*places, robots, 4, count)), own, pairs, blocked)
+    def room(cls, robots: int, count: int) -> Self:
+        """Return memory for populations of `count` individuals."""
+        own, costs = np.empty((2, robots, count))
+        pairs = np.empty((robots * (robots - 1) // 2, count, count), dtype=np.int16)
+        blocked = np.zeros((robots, count), dtype=np.int64)
+        return cls(costs, np.empty((robots, 4, count)), own, pairs, blocked)
 
     @property
     def teamable(self) -> FloatArray:
@@ -323,18 +323,15 @@ def count_crossings(
 
 
 @kernel
-def survey(found: Evaluated, team: IntArray, summary: FloatArray) -> float:
-    """Write the best team (robots,), −1 if there is none, and a summary; return the team's cost.
+def survey(found: Evaluated, summary: FloatArray) -> BestTeam:
+    """Return the best team, and write a summary.
 
-    The summary: index of the best individual of all populations, mean and deviation of all costs,
-    and how many of the first robot have a collision-free partner in every population.
+    It is: index of the best individual of all populations, mean and deviation of all costs, and how
+    many of the first robot have a collision-free partner in every population.
     """
-    teamable = teamable_costs(found.own, found.blocked)
-    best = best_team(found.collisions, teamable)
-    team[:] = best.individuals
     summary[0], summary[1], summary[2] = cost_statistics(found.costs.reshape(-1))
     summary[3] = count_partnered(found.collisions, found.blocked)
-    return best.cost
+    return best_team(found.collisions, teamable_costs(found.own, found.blocked))
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Generations of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
-A path is a row of a table, see `paths.grid_walks`.
+A path is a row of a table, see `paths.grids`.
 """
 
 from typing import Any, NamedTuple
@@ -11,8 +11,7 @@ from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.evolution.succession import summarise
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
-from evoexp.paths.grid_walks import measure_path
-from evoexp.paths.grids import NodeArray
+from evoexp.paths.grids import NodeArray, measure_path
 from evoexp.planners.driver import TableSearch
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,

@@ -1,6 +1,6 @@
 """Crossover and mutation of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
-A path is a row of a table, see `paths.grid_walks`.
+A path is a row of a table, see `paths.grids`.
 """
 
 from typing import NamedTuple
@@ -9,8 +9,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import copy_part, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
-from evoexp.paths.grid_walks import SumArray, erase_loops, walk
-from evoexp.paths.grids import Moves, NodeArray, spread_front
+from evoexp.paths.grids import Moves, NodeArray, SumArray, erase_loops, spread_front, walk
 from evoexp.records import FloatArray, IntArray
 
 NOT_CONNECTED, CONNECTED = -1, -2

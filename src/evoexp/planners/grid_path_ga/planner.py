@@ -4,7 +4,7 @@ Chen & Zalzala 1995, section 2. Every individual is a path of neighbouring nodes
 valid by construction: random walks make permitted moves, and crossover and mutation join them. Its
 cost is the weighted sum of its length and the mean unsafeness of its nodes.
 
-A population is a table of whole numbers, see `paths.grid_walks`; a solution is flat: the
+A population is a table of whole numbers, see `paths.grids`; a solution is flat: the
 coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
 """
 
@@ -21,8 +21,19 @@ from evoexp.errors import SettingError
 from evoexp.evolution.operators.breeding import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all
-from evoexp.paths.grids import UNREACHED, Grid, Moves, NodeArray, spread_front
+from evoexp.paths.grids import (
+    LANES,
+    UNREACHED,
+    WORDS,
+    Grid,
+    Moves,
+    NodeArray,
+    SumArray,
+    spread_front,
+    walk,
+    walk_all,
+    weigh_all,
+)
 from evoexp.paths.motion import Motion
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels

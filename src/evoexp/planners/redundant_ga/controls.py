@@ -13,8 +13,7 @@ from evoexp.planners.planner import WrappedPlanner
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.planner import RedundantGa
-from evoexp.planners.redundant_ga.settings import RealGenetic
-from evoexp.planners.redundant_ga.sub_path import DrawnSearch
+from evoexp.planners.redundant_ga.sub_path import DrawnSearch, RealGenetic
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import PlanarArm, bring_tip_to

@@ -26,8 +26,13 @@ from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, nu
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.redundant_ga.kernels import Judging, judge_paths
-from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
-from evoexp.planners.redundant_ga.sub_path import TERMS, Search
+from evoexp.planners.redundant_ga.sub_path import (
+    TERMS,
+    BinaryGenetic,
+    RealGenetic,
+    Search,
+    SelectiveSettings,
+)
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace

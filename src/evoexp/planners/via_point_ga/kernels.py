@@ -15,8 +15,7 @@ from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
-from evoexp.paths.lengths import measure_paths, relax_points
-from evoexp.paths.redistribution import redistribute_arms
+from evoexp.paths.redistribution import measure_paths, redistribute_arms, relax_points
 from evoexp.records import FloatArray, IntArray
 
 

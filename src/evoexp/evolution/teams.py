@@ -16,7 +16,7 @@ Arrays that all functions of teams share, for P ≥ 2 populations of N individua
 - front  # (P, N) bool: the non-dominated individuals of each population.
 """
 
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,13 +65,8 @@ def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
     Depth first, the cheapest first, with bounds. These are summed in the order of the populations
     like the costs themselves, so rounding cannot make one too high. Where a bound only equals the
     best cost, a branch is worth it if its indices come first in lexicographic order.
-
-    Raises:
-        ValueError: If the shapes contradict each other.
     """
     num, count = own.shape
-    if num < 2 or collisions.shape != (num * (num - 1) // 2, count, count):
-        raise ValueError("collisions and costs do not match")
     order, team = sort_by_cost(own), np.full(num, -1)
     ranks, trial, partial = np.zeros(num, dtype=np.int64), np.full(num, -1), np.zeros(num + 1)
     best, level = np.inf, 0
@@ -119,12 +114,7 @@ class Hall(NamedTuple):
 
     teams: IntArray  # (teams, P) index of the member in each population
     ages: IntArray  # (teams,) generations since each team entered
-
-    @classmethod
-    def room(cls, depth: int, num_populations: int) -> Self:
-        """Return memory for `depth` teams."""
-        teams = np.empty((depth, num_populations), dtype=np.int64)
-        return cls(teams, np.empty(depth, dtype=np.int64))
+    num_teams: IntArray  # (1,) how many teams there are at present; there is room for more
 
 
 class HallRules(NamedTuple):
@@ -207,19 +197,14 @@ def renew_hall(
     collisions: CollisionCounts,  # (pairs, N, N); keys of old teams are computed anew
     own: FloatArray,  # (P, N)
     front: BoolArray,  # (P, N) the non-dominated individuals
-    # with room for as many teams as it may hold; teams and ages are read up to `num_teams`,
-    # everything is rewritten
-    hall: Hall,
-    num_teams: int,  # of the hall at present
+    hall: Hall,  # rewritten
     # (P,) the best team of all, offered to the hall even if none of its members is on a front; −1:
     # none is offered
     best: IntArray,
     rules: HallRules,  # which teams the hall takes
-) -> int:
-    """Choose the next hall: the best of its teams and of those formed around the fronts.
-
-    Returns the number of teams that the hall holds then.
-    """
+) -> None:
+    """Choose the next hall: the best of its teams and of those formed around the fronts."""
+    num_teams = hall.num_teams[0]
     # candidates: the hall's own teams, one per member of a front, the best of all
     most = num_teams + np.count_nonzero(front) + (1 if best[0] >= 0 else 0)
     pool = np.empty((most, len(own)), dtype=np.int64)
@@ -251,7 +236,7 @@ def renew_hall(
         hall.teams[held], hall.ages[held] = pool[taken], ages[taken]
         num_left = drop_rivals(pool, hall.teams[held], rules.exclusive, left, num_left)
         held += 1
-    return held
+    hall.num_teams[0] = held
 
 
 @kernel

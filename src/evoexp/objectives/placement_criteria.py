@@ -57,13 +57,8 @@ class Model(NamedTuple):
     limits: FloatArray  # (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3
 
     def measure(self, angles: FloatArray) -> FloatArray:
-        """Return criteria and branch (CRITERIA + 1, individuals) of θ1, θ2 (2, individuals) [deg].
-
-        ValueError: the angles have another shape.
-        """
+        """Return criteria and branch (CRITERIA + 1, n) of θ1, θ2 (2, n) [deg]."""
         angles = np.ascontiguousarray(angles, dtype=np.float64)
-        if angles.ndim != 2 or len(angles) != 2:
-            raise ValueError(f"angles must have shape (2, individuals), was {angles.shape}")
         out = np.empty((CRITERIA + 1, angles.shape[1]))
         measure_postures(angles, angles.shape[1], self, out)
         return out

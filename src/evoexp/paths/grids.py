@@ -80,15 +80,10 @@ def grid(blocked: BoolArray) -> Grid:
     `blocked` (nodes along x, along y[, along z]) is true for a node of an obstacle. A diagonal move
     is permitted if its two nodes are also joined by lateral moves within the box that they span:
     "It is not permissible for the robot to pass between the corners of obstacle regions" (Chen &
-    Zalzala 1995, section 2.1), and it may touch the corner of one. ValueError: not two or three
-    dimensions.
+    Zalzala 1995, section 2.1), and it may touch the corner of one.
     """
-    dimensions = blocked.ndim
-    if dimensions not in (2, 3):
-        raise ValueError(f"blocked must have two or three dimensions, was {blocked.shape}")
-    moves = sorted(
-        itertools.product((-1, 0, 1), repeat=dimensions), key=lambda move: sum(map(abs, move))
-    )[1:]
+    steps = itertools.product((-1, 0, 1), repeat=blocked.ndim)
+    moves = sorted(steps, key=lambda move: sum(map(abs, move)))[1:]
     free = np.pad(~blocked.astype(bool), 1)
     nodes = np.arange(free.size, dtype=np.int32).reshape(free.shape)
     changes = np.array([sum(map(abs, move)) for move in moves], dtype=np.int32)

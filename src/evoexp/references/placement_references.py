@@ -161,7 +161,6 @@ def _is_lowest(model: Model, theta: FloatArray, branch: int, cost: float) -> boo
 
 
 def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:
-    """Return whether θ1 and θ2 are those of a known minimum."""
     apart = [(theta - other[:2] + TURN / 2) % TURN - TURN / 2 for other in known]
     return any(np.abs(each).max() <= SAME for each in apart)
 

@@ -51,7 +51,7 @@ class GeneticSettings(PopulationSettings):
 
 
 class ScaledGenetic(PopulationSettings):
-    """A generational genetic algorithm whose parents are chosen as in `scaled_selection`.
+    """A generational genetic algorithm whose parents are chosen as in `succession`.
 
     Costs are scaled linearly, then parents are drawn by stochastic remainder sampling without
     replacement. The systematic scan of the remainders is assumed: Chen & Zalzala 1995 name the

@@ -2,7 +2,7 @@
 
 import math
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -28,6 +28,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
+    Generation,
     Heredity,
     copy_fronts,
     count_members,
@@ -130,14 +131,6 @@ class CoevolutionSettings(PopulationSettings):
         return min(max(self.mutation_rate - self.mutation_decay * share, 0.0), 1.0)
 
 
-class Generation(NamedTuple):
-    """Populations, judged."""
-
-    populations: FloatArray  # (robots, 2 K, individuals)
-    judged: Evaluated  # all against all
-    best: BestTeam  # the best team, if there is one
-
-
 @kernel
 def follow(
     select: Select,
@@ -148,7 +141,6 @@ def follow(
     rate: float,  # of mutation
     heredity: Heredity,  # the rules
     present: Generation,
-    num_teams: IntArray,  # (1,) changed
 ) -> tuple[FloatArray, int]:
     """Renew the hall of fame, and breed the populations that follow a generation.
 
@@ -156,12 +148,12 @@ def follow(
     many numbers were taken: uniform in [0, 1), for each moving robot those of parents, cross-over,
     mutation.
     """
-    rules, hall, (before, judged, best) = heredity.breeding, heredity.hall, present
+    rules, hall, (before, judged, _) = heredity.breeding, heredity.hall, present
     if heredity.copies_fronts:
-        num_teams[0] = copy_fronts(before, judged, heredity)
+        copy_fronts(present, heredity)
     elif len(hall.teams):
-        num_teams[0] = renew(before, judged, best.individuals, num_teams[0], heredity)
-    teams, num_elites, taken = hall.teams[: num_teams[0]], heredity.num_elites, 0
+        renew(present, heredity)
+    teams, num_elites, taken = hall.teams[: hall.num_teams[0]], heredity.num_elites, 0
     fewest, elites = len(teams), np.empty(num_elites, dtype=np.int64)
     for robot in range(len(before)):
         fewest = min(fewest, count_members(teams, robot))
@@ -203,22 +195,26 @@ class TeamSearch(TableSearch):
         self.costs = np.empty((self.num_places, robots, self._size))
         by_genome, operators = ga.hall_distinct == "genome", ga.operators
         genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
-        counts = [free - teams for teams in range(ga.num_hall_teams + 1)]
+        depth = ga.num_hall_teams
+        counts = [free - teams for teams in range(depth + 1)]
         self._operators, self._waiting = operators.addresses, 0
         self._heredity = Heredity(
             ga.num_elites,
             Breeding.of(operators, genome, ga, counts),
             problem.moving,
-            Hall.room(ga.num_hall_teams, robots),
+            Hall(
+                teams=np.empty((depth, robots), dtype=np.int64),
+                ages=np.empty(depth, dtype=np.int64),
+                num_teams=np.zeros(1, dtype=np.int64),
+            ),
             HallRules(
                 memory=ga.hall_memory or 0,
                 frozen=ga.hall_frozen,
                 exclusive=problem.moving if by_genome else np.ones_like(problem.moving),
             ),
             by_genome,
-            ga.num_hall_teams > 0 and ga.hall_members == "front",
+            depth > 0 and ga.hall_members == "front",
         )
-        self._num_teams = np.zeros(1, dtype=np.int64)
         # uniform numbers that a generation takes at most
         most = int(np.count_nonzero(problem.moving))
         most *= int(self._heredity.breeding.sizes.sum(axis=1).max())
@@ -233,7 +229,7 @@ class TeamSearch(TableSearch):
         state, uniforms = rng.bit_generator.state, rng.random(self._most_drawn)
         self._waiting, ga = 0 if self.keeper.best.solved else self._waiting + 1, self._planner.ga
         if ga.restart_after is None or self._waiting < ga.restart_after:
-            rate, rules = ga.mutation_rate_at(last), (self._heredity, self.present, self._num_teams)
+            rate, rules = ga.mutation_rate_at(last), (self._heredity, self.present)
             populations, taken = follow(*self._operators, uniforms, first, rate, *rules)
         else:
             # "If no convergence has occurred, …, the algorithm generates new populations" (section
@@ -242,7 +238,7 @@ class TeamSearch(TableSearch):
             taken = math.prod(shape)
             own = uniforms[:taken].reshape(shape)
             populations = self._planner.populations_of(self._problem, own)
-            self._waiting = self._num_teams[0] = 0
+            self._waiting = self._heredity.hall.num_teams[0] = 0
         rng.bit_generator.state = state  # the generator goes on behind the numbers that were taken
         rng.random(taken)
         self._judge(populations, last % self.num_places)

@@ -97,6 +97,14 @@ class Evaluated(NamedTuple):
         return terms
 
 
+class Generation(NamedTuple):
+    """Populations, judged."""
+
+    populations: FloatArray  # (robots, 2 K, individuals)
+    judged: Evaluated  # all against all
+    best: BestTeam  # the best team, if there is one
+
+
 class Heredity(NamedTuple):
     """The rules by which one generation follows another."""
 
@@ -136,17 +144,14 @@ def count_members(teams: IntArray, robot: int) -> int:
 
 
 @kernel
-def copy_fronts(populations: FloatArray, judged: Evaluated, heredity: Heredity) -> int:
+def copy_fronts(present: Generation, heredity: Heredity) -> None:
     """Let the hall hold the front of each population, the cheapest if it has too few places.
 
     "The Pareto front is copied to the next generation. The size of the front is limited"
-    (section 3). Populations are (robots, genes, individuals). Where a front is smaller than
-    others, members −1 stand at the end.
-
-    Returns:
-        Number of rows of the hall that are used.
+    (section 3). Where a front is smaller than others, members −1 stand at the end.
     """
-    criteria, costs, teams, used = judged.criteria, judged.costs, heredity.hall.teams, 0
+    (populations, judged, _), teams, used = present, heredity.hall.teams, 0
+    criteria, costs = judged.criteria, judged.costs
     fronts = np.empty(costs.shape, dtype=np.bool_)
     for robot in range(len(populations)):
         fronts[robot] = pareto_front(criteria[robot])
@@ -161,35 +166,30 @@ def copy_fronts(populations: FloatArray, judged: Evaluated, heredity: Heredity) 
         for k in range(held):
             teams[k, robot] = front[order[k]]
         used = max(used, held)
-    return used
+    heredity.hall.num_teams[0] = used
 
 
 @kernel
-def renew(
-    populations: FloatArray,  # (robots, genes, individuals)
-    judged: Evaluated,  # of them
-    best: IntArray,  # (robots,) the best team; −1 if there is none
-    num_teams: int,  # teams of the hall at present
-    heredity: Heredity,  # the hall and its rules
-) -> int:
+def renew(present: Generation, heredity: Heredity) -> None:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
 
     Members of the fronts are offered with their best collaborators. With distinct genomes the best
     team of the generation is offered as it is, so that it is never lost; and a robot that stands
-    still, which has one genome, may be in all teams. Returns how many teams the hall holds then.
+    still, which has one genome, may be in all teams.
     """
-    hall, criteria, collisions = heredity.hall, judged.criteria, judged.collisions
+    (populations, judged, best), hall, criteria = present, heredity.hall, present.judged.criteria
+    teams = hall.teams[: hall.num_teams[0]]
     own = teamable_costs(judged.own, judged.blocked)
     fronts = np.empty(own.shape, dtype=np.bool_)
     for robot in range(len(populations)):
         fronts[robot] = pareto_front(criteria[robot])
     if heredity.by_genome:
-        merge_copies(populations, criteria[:, 1], hall.teams[:num_teams], fronts)
-        offered = best
+        merge_copies(populations, criteria[:, 1], teams, fronts)
+        offered = best.individuals
     else:
-        drop_copies(populations, hall.teams[:num_teams], fronts)
+        drop_copies(populations, teams, fronts)
         offered = np.full(len(populations), -1)
-    return int(renew_hall(collisions, own, fronts, hall, num_teams, offered, heredity.rules))
+    renew_hall(judged.collisions, own, fronts, hall, offered, heredity.rules)
 
 
 @kernel

@@ -187,7 +187,10 @@ class Coevolution(PlannerDefaults, Component):
     def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
         """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
         collision, (robots, _, count) = problem.collision, populations.shape
-        found, task = Evaluated.room(robots, count), self.task(problem)
+        weights = self.objective.own_weights, self.objective.collision_weight
+        envelope = self.collision.half_width, self.collision.tcp_radius
+        task = LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
+        found = Evaluated.room(robots, count)
         # paths, and C2 … C4 (Eqs. 6–8)
         shape, is_lines = (robots, self.num_configurations + 2), collision.is_lines
         paths, outlines = np.empty((*shape, 2, count)), np.empty((*shape, 4, count))
@@ -202,12 +205,6 @@ class Coevolution(PlannerDefaults, Component):
         if not (fits and count_crossings(outlines, int(is_lines), task, found)):
             raise ValueError(REFUSED)
         return found
-
-    def task(self, problem: Problem) -> LineTask:
-        """Return the robots and the weights of their criteria, as kernels take them."""
-        weights = self.objective.own_weights, self.objective.collision_weight
-        envelope = self.collision.half_width, self.collision.tcp_radius
-        return LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

@@ -14,7 +14,7 @@ from evoexp.objectives.posture_cost import COLUMNS
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.planners.posture_es import kernels
-from evoexp.planners.posture_es.kernels import COST, Members, Memory, Strategy
+from evoexp.planners.posture_es.kernels import COST, ROWS, Members, Memory, Strategy
 from evoexp.planners.posture_es.phases import Problem, Stage
 from evoexp.records import Block, FloatArray, IntArray
 from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
@@ -134,13 +134,13 @@ class Search:
         self._cycles, self._idle, self._won = 0, 0, bool(judged.met[0])
 
     def _advance(self, rng: np.random.Generator) -> None:
-        """Go on to the next cycle."""
         ga, nq, members = self._ga, len(self._offspring), self._members
         bred = ga.num_offspring if self._cycles else ga.initial_size
         count = bred + ga.num_immigrants
         if self._cycles == 0 or self._offspring.shape[1] != count:
-            self._memory = Memory.of(nq, count)
-            self._offspring = self._memory.offspring
+            self._offspring, origin = np.empty((nq, count)), np.empty(count, dtype=np.int64)
+            rows, flags = np.empty((ROWS, count)), np.empty((2, count), dtype=np.bool_)
+            self._memory = Memory(self._offspring, origin, rows, *flags)
         # all uniform numbers of the cycle are drawn first, then all normal ones
         gaussian, normal = ga.mutation == "gaussian", ga.parent_choice == "gaussian"
         per_child = (0 if gaussian else nq) + (2 + nq if ga.crossover_rate > 0.0 else 0)

@@ -323,7 +323,6 @@ class Problem:
 
 
 def _are_among(phase: Phase, one: str, two: str) -> bool:
-    """Return whether two bodies may touch in a phase."""
     return any({one, two} == set(pair) for pair in phase.contacts)
 
 

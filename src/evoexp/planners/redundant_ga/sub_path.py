@@ -198,7 +198,7 @@ class Search(GeneticSearch):
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
         uniforms = rng.random(self._num_genes * self._ga.population_size)
-        kernels.begin(uniforms, self._sub_path, self._tables, self.summaries)
+        kernels.begin(uniforms, self._sub_path, self._tables)
         self.states = [state_bytes(rng.bit_generator)]
         self._summarise(0)
 

@@ -227,7 +227,6 @@ class _ReachingSearch:
         return np.array([] if length is None else [length])
 
     def candidate(self) -> Candidate:
-        """Return the shortest plan as it is recorded."""
         terms = {
             "length_deg": self.best_cost,
             "iterations": float(self._iterations),

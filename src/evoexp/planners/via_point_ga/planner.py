@@ -27,9 +27,8 @@ from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
 from evoexp.planners.planner import COPIES, JudgementArrays, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
-from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.string_operators import NewTrajectories, StringCrossover
-from evoexp.planners.via_point_ga.strings import Problem, ProvenSearch, Search, Strings, settle
+from evoexp.planners.via_point_ga.strings import Problem, Search, Strings, settle, smooth
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import (
@@ -110,8 +109,7 @@ class ViaPointGa(ArmDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
-        kind = ProvenSearch if self.answers_are_proven else Search
-        return kind(self, problem).blocks(rng)
+        return Search(self, problem).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
@@ -143,7 +141,7 @@ class ViaPointGa(ArmDefaults, Component):
         """
         strings, count = Strings(self, problem), population.shape[2]
         improved = strings.padded(population)
-        kernels.smooth(improved, count, strings.settings)
+        smooth(improved, count, strings.settings)
         return improved[:, :, :count]
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:

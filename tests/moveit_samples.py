@@ -9,7 +9,7 @@ import pinocchio as pin
 import yaml
 
 from evoexp.condition import Condition
-from evoexp.planners.moveit_tasks import arm_motion
+from evoexp.planners.arm_tasks import arm_motion
 from evoexp.robots.meshes import loaded_mesh
 from evoexp.scenarios.moveit_files import REQUEST, SCENE, MessagePart, read_document
 from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world

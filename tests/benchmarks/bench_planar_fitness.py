@@ -13,8 +13,7 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.objectives.string_fitness import StringTerms
-from evoexp.planners.via_point_ga.kernels import judge
-from evoexp.planners.via_point_ga.strings import Strings
+from evoexp.planners.via_point_ga.strings import Strings, judge
 from evoexp.records import FloatArray, generations
 from evoexp.testing import conditions
 

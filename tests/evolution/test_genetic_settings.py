@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.planners.coevolution.settings import CoevolutionSettings
+from evoexp.planners.coevolution.generations import CoevolutionSettings
 from evoexp.planners.posture_es.cycles import StrategySettings
 from evoexp.validation import build
 

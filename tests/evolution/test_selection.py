@@ -15,7 +15,7 @@ from evoexp.evolution.operators.selection import (
     Tournament,
     spin_roulette,
 )
-from evoexp.evolution.scaled_selection import scale_costs
+from evoexp.evolution.succession import scale_costs
 
 INF, NAN = np.inf, np.nan
 COUNT = 40_000

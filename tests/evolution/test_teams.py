@@ -1,4 +1,4 @@
-"""Best teams and teams around members of a front, beside the slow co-evolution's."""
+"""Teams beside the slow co-evolution's, and dominance beside its definition."""
 
 import itertools
 from typing import Any
@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.evolution.best_team import best_team
-from evoexp.evolution.hall_of_fame import gather_teams, rate_team
+from evoexp.evolution.succession import pareto_front
+from evoexp.evolution.teams import best_team, gather_teams, rate_team
 from references.curkovic_numpy import Judged, formed
 
 NOTHING: Any = None
@@ -74,11 +74,31 @@ def test_edges_of_costs(own: list[list[float]], team: list[int]) -> None:
     assert best_team(free, costs).individuals.tolist() == team
 
 
-@pytest.mark.parametrize(
-    ("collisions", "own"), [((1, 4, 5), (2, 5)), ((1, 5, 5), (3, 5)), ((0, 5, 5), (1, 5))]
+VALUES = st.sampled_from([0.0, -0.0, 1.0, 2.0, 3.0, np.inf, -np.inf, np.nan])
+TABLES = st.integers(1, 6).flatmap(
+    lambda rows: st.lists(st.lists(VALUES, min_size=rows, max_size=rows), min_size=1, max_size=30)
 )
-def test_arrays_that_do_not_match_are_errors(
-    collisions: tuple[int, ...], own: tuple[int, ...]
-) -> None:
-    with pytest.raises(ValueError, match="do not match"):
-        best_team(np.zeros(collisions, dtype=np.int16), np.ones(own))
+
+
+def front_by_definition(criteria: np.ndarray) -> list[bool]:
+    def dominates(a: np.ndarray, b: np.ndarray) -> bool:
+        return bool(np.all(a <= b) and np.any(a < b))
+
+    columns = criteria.T
+    return [
+        not np.isnan(own).any() and not any(dominates(other, own) for other in columns)
+        for own in columns
+    ]
+
+
+@pytest.mark.parametrize("num_criteria", [1, 2, 3, 4, 5, 8, 9])
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 64, 101])
+def test_front_is_what_the_definition_says(num_criteria: int, count: int) -> None:
+    criteria = np.random.default_rng(10 * count + num_criteria).random((num_criteria, count))
+    assert pareto_front(criteria).tolist() == front_by_definition(criteria)
+
+
+@given(TABLES)
+def test_ties_infinities_and_nan(individuals: list[list[float]]) -> None:
+    criteria = np.ascontiguousarray(np.array(individuals).T)
+    assert pareto_front(criteria).tolist() == front_by_definition(criteria)

@@ -3,14 +3,15 @@
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.objectives.placement_criteria import PlacementCriteria
-from evoexp.objectives.placement_kernels import Model, Task
-from references.placement_numpy import LENGTHS, pinocchio_posture
+from evoexp.objectives.placement_criteria import Model, PlacementCriteria, Task
+from evoexp.robots.mobile_robots import MobileArm
 
+LENGTHS = (1.0, 1.0, 0.5)
 ANYTHING = np.array([[-np.inf, np.inf]] * 6)
 PLAIN: dict[str, Any] = {
     "torque_norm_weight": 1.0,
@@ -32,6 +33,21 @@ def model(
     objective = PlacementCriteria(**(PLAIN | weights))
     table = np.array(avoided, dtype=np.float64).reshape(-1, 5)
     return Model(Task(*LENGTHS, 5.0, height, *force), objective.weights, table, limits)
+
+
+def pinocchio_posture(
+    q: np.ndarray, force: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return end-effector (2,), Jacobian (2, 3), torques (3,) at q = (X_p, Θ1, θ2, θ3) [rad]."""
+    model = MobileArm(link_lengths=LENGTHS, platform_size=(0.6, 0.2)).build().model
+    tip = pin.SE3(np.eye(3), np.array([LENGTHS[2], 0.0, 0.0]))
+    frame = model.addFrame(pin.Frame("tip", model.njoints - 1, 0, tip, pin.FrameType.OP_FRAME))
+    data = model.createData()
+    pin.computeJointJacobians(model, data, q)
+    pin.updateFramePlacements(model, data)
+    whole = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    jacobian = whole[:2, 1:]
+    return data.oMf[frame].translation[:2], jacobian, jacobian.T @ force
 
 
 @settings(max_examples=80, deadline=None)

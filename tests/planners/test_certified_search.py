@@ -16,7 +16,7 @@ from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.collision.scene import Part
 from evoexp.condition import Condition
-from evoexp.evolution.best_team import best_team
+from evoexp.evolution.teams import best_team
 from evoexp.paths.motion import Motion
 from evoexp.planners.coevolution.generations import ProvenTeams
 from evoexp.planners.proofs import Proofs

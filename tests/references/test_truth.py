@@ -1,10 +1,15 @@
-"""References run, are stored, shown, reproduced and reported like conditions of one replicate."""
+"""References run, are stored, shown, reproduced and reported like conditions of one replicate.
+
+They have the same bits whatever number of threads linear algebra has.
+"""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg  # noqa: F401  # loads the BLAS whose threads are counted
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from composed import composed
 from evoexp.batch import replicate
@@ -19,11 +24,13 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
+from evoexp.references.reference import one_thread
 from evoexp.report.results.stored_results import gather
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory
 from guests import on_path, write_distribution
+from masked_logs import masked_log
 
 SMALL = ("ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
 EXPERIMENT = ("experiment=rana_obstacles", *SMALL, "runner=serial")
@@ -154,3 +161,26 @@ def test_references_run_first(tmp_path: Path) -> None:
     assert [job.condition_id for job in batch.jobs] == [truth.id, planner.id, planner.id]
     assert len(list(batch.run())) == 3
     assert RunDirectory(tmp_path, truth.id).completed() == {0}
+
+
+LABEL = "B platform, conventional"  # whose optimiser takes other steps with two threads
+
+
+def num_threads() -> list[int]:
+    return [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+
+
+def test_threads_are_one_inside_and_as_before_outside() -> None:
+    with threadpool_limits(2, "blas"):
+        assert set(num_threads()) == {2}, "numpy and scipy have a BLAS each"
+        with one_thread():
+            assert set(num_threads()) == {1}
+        assert set(num_threads()) == {2}
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_reference_beside_any_number_of_threads(threads: int) -> None:
+    condition = composed("experiment=chen_placement", "budget=smoke", label=LABEL)
+    plain = masked_log(run_replicate(condition, 0).content)
+    with threadpool_limits(threads, "blas"):
+        assert masked_log(run_replicate(condition, 0).content) == plain

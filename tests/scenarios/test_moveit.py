@@ -14,7 +14,7 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.moveit_tasks import links_of_bodies, with_allowed_pairs
+from evoexp.planners.arm_tasks import links_of_bodies, with_allowed_pairs
 from evoexp.scenarios.moveit import MoveitTask, read_link_goal, read_request
 from evoexp.scenarios.moveit_files import FIELDS, REQUEST, SCENE
 from evoexp.scenarios.moveit_scene import read_allowed, read_frames, read_state

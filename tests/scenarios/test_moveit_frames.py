@@ -17,7 +17,7 @@ from evoexp.collision.scene import obstacle_shapes
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.planners.moveit_tasks import posture_task
+from evoexp.planners.arm_tasks import posture_task
 from evoexp.robots.meshes import convex_shape
 from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table
 from evoexp.testing import conditions

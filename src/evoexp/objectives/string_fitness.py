@@ -45,15 +45,9 @@ class StringFitness(Component):
 
 
 @kernel
-def weigh(
-    weights: tuple[float, float, float],  # k1, k2, k3
-    lengths: FloatArray,  # (arms, ≥ individuals) [deg]
-    unevenness: FloatArray,  # (arms, ≥ individuals) [deg]
-    collisions: FloatArray,  # (≥ individuals,) colliding instants
-    cost: FloatArray,  # (individuals,), written
-) -> None:
-    """Write the bracket of Eq. 7 for every individual."""
-    k1, k2, k3 = weights
+def weigh(weights: tuple[float, float, float], terms: StringTerms) -> None:
+    """Write the bracket of Eq. 7 for every individual that has a cost, by k1, k2, k3."""
+    (k1, k2, k3), (lengths, unevenness, collisions, cost) = weights, terms
     for k in range(len(cost)):
         length, uneven = 0.0, 0.0
         for arm in range(len(lengths)):

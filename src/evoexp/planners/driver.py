@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.evolution.genetic_settings import PopulationSettings, ScaledGenetic
-from evoexp.evolution.operators.breeding import Breeding, Operators
+from evoexp.evolution.operators.breeding import (
+    Breeding,
+    Operators,
+    PopulationSettings,
+    ScaledGenetic,
+)
 from evoexp.evolution.operators.operator import Genome
-from evoexp.evolution.scaled_selection import SelectionMemory
 from evoexp.numeric.elementary import standard_normal
 from evoexp.numeric.generator_state import state_bytes, states_behind
 from evoexp.numeric.random_stream import Draws
@@ -173,7 +176,7 @@ class GeneticSearch(TableSearch):
 
 
 class ScaledSearch(TableSearch):
-    """A run whose parents are chosen as in `scaled_selection`, by blocks of uniform numbers.
+    """A run whose parents are chosen as in `succession`, by blocks of uniform numbers.
 
     All generations of a call are recorded with the generator as it is behind the last of them: the
     number of generations per call enters the digest.
@@ -184,7 +187,6 @@ class ScaledSearch(TableSearch):
     def __init__(self, ga: ScaledGenetic, per_call: int, num_drawn: int) -> None:
         """Begin a run that draws `num_drawn` uniform numbers at once, at least."""
         super().__init__(ga, per_call)
-        self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
         self.draws = Draws(num_drawn)
 
     def at(self, generation: int) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.scene import Part
-from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
+from evoexp.evolution.succession import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.answers import JudgementArrays as JudgementArrays

@@ -14,7 +14,7 @@ from scipy import optimize
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.objectives.placement_kernels import Model
+from evoexp.objectives.placement_criteria import Model
 from evoexp.records import FloatArray
 
 INSIDE = 1e-11  # [rad], of torques [-]: on a limit, in spite of rounding, is within it
@@ -44,13 +44,8 @@ class Directions(NamedTuple):
         Quantities: 0, 1, 2 are joint angles; 3, 4, 5 torques.
         """
         limits = np.concatenate([self.joint_limits, self.torque_limits])
-        rows = [
-            (float(k), sign, limit)
-            for k, (least, greatest) in enumerate(limits)
-            for sign, limit in ((1.0, least), (-1.0, greatest))
-            if np.isfinite(limit)
-        ]
-        return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
+        quantity, side = np.nonzero(np.isfinite(limits))
+        return np.column_stack([quantity, 1.0 - 2.0 * side, limits[quantity, side]])
 
     def theta(self, x: FloatArray) -> FloatArray:
         """Return θ1, θ2 [deg] of x, both in [−180, 180)."""

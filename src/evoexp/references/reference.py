@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import CostStatistics
+from evoexp.evolution.succession import CostStatistics
 from evoexp.planners.planner import Candidate, Keeper, Reproducibility, WrappedPlanner
 from evoexp.records import Block, FloatArray
 

@@ -1,6 +1,6 @@
 """A task that MoveIt wrote: a planning scene, and a motion plan request in it, as YAML.
 
-The files are read at the door and travel with the condition as contents. `planners.moveit_tasks`
+The files are read at the door and travel with the condition as contents. `planners.arm_tasks`
 says the same task in the words of the planners: from a configuration to another one, or to a pose
 of the tool.
 """

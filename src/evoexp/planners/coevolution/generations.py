@@ -1,20 +1,34 @@
-"""One run of co-evolving populations: the way from a generation to the next (Fig. 2)."""
+"""One run of co-evolving populations: its settings, and the way to the next generation (Fig. 2)."""
 
+import math
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.evolution.best_team import BestTeam, best_team
-from evoexp.evolution.hall_of_fame import Hall, HallRules
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.operators.breeding import (
+    Breeding,
+    Cross,
+    Mutate,
+    Operators,
+    PopulationSettings,
+    Select,
+    breed,
+)
+from evoexp.evolution.operators.crossover import OnePoint
+from evoexp.evolution.operators.mutation import AlleleMutation
+from evoexp.evolution.operators.operator import Crossover, Genome, Mutation, Named, Selection
+from evoexp.evolution.operators.selection import DifferenceRoulette, InverseRoulette
 from evoexp.evolution.succession import choose_elites, copy_members
+from evoexp.evolution.teams import BestTeam, Hall, HallRules, best_team
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
+    Generation,
     Heredity,
     copy_fronts,
     count_members,
@@ -25,32 +39,96 @@ from evoexp.planners.driver import TableSearch
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
+from evoexp.validation import Count, Positive, Rate
 
 if TYPE_CHECKING:
     from evoexp.planners.coevolution.planner import Coevolution, Problem
 
 MOST = 100  # teams that are judged of one generation; the others are no answer
+_FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
-class Table(NamedTuple):
-    """Some generations; number g is at place g modulo the number of places."""
+class CoevolutionSettings(PopulationSettings):
+    """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3)."""
 
-    populations: FloatArray  # (places, robots, 2 K, individuals)
-    judged: Evaluated  # of each place
-    teams: IntArray  # (places, robots) the best team of each; −1 if there is none
-    team_costs: FloatArray  # (places,) inf if there is none
+    component: ClassVar[str] = "coevolutionary"
 
+    # difference of `mutation_rate`, that of one allele of an individual, between the first and the
+    # last generation (Eq. 10) [-]; 0: it is constant
+    mutation_decay: Rate
+    mutation_step: Positive  # largest change of an allele (Eq. 9) [deg]
+    # `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`
+    mutation_direction: Literal["one_sided", "symmetric"]
+    # weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the
+    # highest
+    selection: Literal["inverse", "difference"] | Named[Selection]
+    hall_depth: Rate  # share of a population that the hall of fame may hold [-]; 0: no hall
+    # generations after which a team of the hall gives way to any new one [-]; None: never
+    hall_memory: Count | None
+    hall_frozen: bool  # whether a full hall stays as it is (an ablation)
+    # generations without a feasible team before fresh populations are drawn [-]; None: never
+    restart_after: Count | None
+    # nobody is in two teams of the hall. `genome`: copies count as one, and members of the
+    # hall are offered again, so that one may find a better partner. `index`: copies count as
+    # others, so the hall may fill with copies of one team; members of the hall are not
+    # offered again. Runs by index are bit for bit those of revision 1 of `coevolution`,
+    # unless a link's angle is exactly a multiple of 90°
+    hall_distinct: Literal["genome", "index"] = "genome"
+    # what the hall holds. `pairs`: teams of members of the fronts, until a better one is found;
+    # `front`: the present front of each population, the cheapest first, copied to the next
+    hall_members: Literal["pairs", "front"] = "pairs"
 
-@kernel
-def at_place(judged: Evaluated, place: int) -> Evaluated:
-    """Return the populations at a place, evaluated: views."""
-    return Evaluated(
-        judged.costs[place],
-        judged.criteria[place],
-        judged.own[place],
-        judged.collisions[place],
-        judged.blocked[place],
-    )
+    crossover: Named[Crossover] | None = None  # None: at one point
+    mutation: Named[Mutation] | None = None  # None: of one allele (Eq. 9)
+
+    @model_validator(mode="after")
+    def _settings_agree(self) -> Self:
+        rate, demand = self.mutation_rate, self.demand
+        demand("mutation_decay", self.mutation_decay <= rate, f"at most mutation_rate ({rate})")
+        has_hall, no_hall = self.hall_depth > 0.0, "where there is no hall (hall_depth is 0)"
+        must = "0, or large enough for one pair (at least 1/population_size)"
+        demand("hall_depth", not has_hall or self.num_hall_teams > 0, must)
+        demand("hall_memory", has_hall or self.hall_memory is None, f"null {no_hall}")
+        demand("hall_frozen", has_hall or not self.hall_frozen, f"false {no_hall}")
+        demand("hall_distinct", has_hall or self.hall_distinct == "genome", f"genome {no_hall}")
+        pairs, no_pairs = self.hall_members == "pairs", "where fronts are copied"
+        demand("hall_members", has_hall or pairs, f"pairs {no_hall}")
+        demand("hall_memory", pairs or self.hall_memory is None, f"null {no_pairs}")
+        demand("hall_frozen", pairs or not self.hall_frozen, f"false {no_pairs}")
+        must = "null where the hall is frozen (hall_frozen)"
+        demand("hall_memory", not self.hall_frozen or self.hall_memory is None, must)
+        most = self.population_size - self.num_hall_teams
+        must = f"at most population_size less the hall's teams ({most})"
+        demand("num_elites", self.num_offspring >= 0, must)
+        takes_normals = self.mutation is not None and self.mutation.takes_normals
+        demand("mutation", not takes_normals, "one that takes uniform numbers only")
+        return self
+
+    @property
+    def num_hall_teams(self) -> int:
+        """Teams that the hall of fame may hold; each takes one individual of every population."""
+        return math.floor(self.hall_depth * self.population_size + _FLOOR_GUARD)
+
+    @property
+    def num_offspring(self) -> int:
+        """Individuals of a population that are new beside the elites and a full hall."""
+        return self.population_size - self.num_elites - self.num_hall_teams
+
+    @property
+    def operators(self) -> Operators:
+        """The paper's operators, where the settings name no others."""
+        named: dict[Any, Any] = {"inverse": InverseRoulette(), "difference": DifferenceRoulette()}
+        step, symmetric = DEGREE * self.mutation_step, self.mutation_direction == "symmetric"
+        return Operators(
+            named.get(self.selection, self.selection),
+            self.crossover or OnePoint(),
+            self.mutation or AlleleMutation(step=step, symmetric=symmetric),
+        )
+
+    def mutation_rate_at(self, index: int) -> float:
+        """Return the rate on the way to a generation (Eq. 10: 1 − 0.9 t/G)."""
+        share = index / self.num_generations if self.num_generations > 0 else 0.0
+        return min(max(self.mutation_rate - self.mutation_decay * share, 0.0), 1.0)
 
 
 @kernel
@@ -62,32 +140,30 @@ def follow(
     index: int,  # the present generation
     rate: float,  # of mutation
     heredity: Heredity,  # the rules
-    table: Table,  # generations, of which the next one is written
-    num_teams: IntArray,  # (1,) changed
-) -> int:
-    """Renew the hall of fame, and breed the generation that follows one.
+    present: Generation,
+) -> tuple[FloatArray, int]:
+    """Renew the hall of fame, and breed the populations that follow a generation.
 
-    It has offspring, then elites, then members of the hall, unchanged. Returns how many numbers it
-    took: uniform in [0, 1), for each moving robot those of parents, cross-over, mutation.
+    They have offspring, then elites, then members of the hall, unchanged. Returns them, and how
+    many numbers were taken: uniform in [0, 1), for each moving robot those of parents, cross-over,
+    mutation.
     """
-    rules = heredity.breeding
-    own, other = index % len(table.team_costs), (index + 1) % len(table.team_costs)
-    hall, before, judged = heredity.hall, table.populations[own], at_place(table.judged, own)
+    rules, hall, (before, judged, _) = heredity.breeding, heredity.hall, present
     if heredity.copies_fronts:
-        num_teams[0] = copy_fronts(before, judged, heredity)
+        copy_fronts(present, heredity)
     elif len(hall.teams):
-        num_teams[0] = renew(before, judged, table.teams[own], num_teams[0], heredity)
-    teams, num_elites, taken = hall.teams[: num_teams[0]], heredity.num_elites, 0
+        renew(present, heredity)
+    teams, num_elites, taken = hall.teams[: hall.num_teams[0]], heredity.num_elites, 0
     fewest, elites = len(teams), np.empty(num_elites, dtype=np.int64)
     for robot in range(len(before)):
         fewest = min(fewest, count_members(teams, robot))
-    size = np.sum(rules.sizes[fewest])
+    size, following = np.sum(rules.sizes[fewest]), np.empty(before.shape)
     for robot in range(len(before)):
         held = count_members(teams, robot)
         members, count = teams[:held, robot].copy(), before.shape[2] - num_elites - held
         for k in range(held):
             teams[k, robot] = count + num_elites + k
-        out, genomes = table.populations[other, robot], before[robot]
+        out, genomes = following[robot], before[robot]
         costs, normals = judged.costs[robot], np.empty((0, 0))
         if not heredity.moving[robot]:
             out[:] = genomes
@@ -101,11 +177,13 @@ def follow(
         choose_elites(costs, elites)
         copy_members(genomes, elites, out, count)
         copy_members(genomes, members, out, count + num_elites)
-    return int(taken)
+    return following, int(taken)
 
 
 class TeamSearch(TableSearch):
-    """One run, and memory for its generations."""
+    """One run."""
+
+    present: Generation  # the one computed last
 
     def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
         """Begin a run."""
@@ -114,85 +192,76 @@ class TeamSearch(TableSearch):
         self._proven = ProvenTeams(planner, problem) if planner.answers_are_proven else None
         super().__init__(ga, 1)
         num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
-        self._table = Table(
-            np.empty((self.num_places, robots, num_genes, self._size)),
-            Evaluated.room(self.num_places, robots, self._size),
-            np.empty((self.num_places, robots), dtype=np.int64),
-            np.empty(self.num_places),
-        )
-        self.costs, self._waiting = self._table.judged.costs, 0
+        self.costs = np.empty((self.num_places, robots, self._size))
         by_genome, operators = ga.hall_distinct == "genome", ga.operators
         genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
-        counts = [free - teams for teams in range(ga.num_hall_teams + 1)]
-        self._operators = operators.addresses
+        depth = ga.num_hall_teams
+        counts = [free - teams for teams in range(depth + 1)]
+        self._operators, self._waiting = operators.addresses, 0
         self._heredity = Heredity(
             ga.num_elites,
             Breeding.of(operators, genome, ga, counts),
             problem.moving,
-            Hall.room(ga.num_hall_teams, robots),
+            Hall(
+                teams=np.empty((depth, robots), dtype=np.int64),
+                ages=np.empty(depth, dtype=np.int64),
+                num_teams=np.zeros(1, dtype=np.int64),
+            ),
             HallRules(
                 memory=ga.hall_memory or 0,
                 frozen=ga.hall_frozen,
                 exclusive=problem.moving if by_genome else np.ones_like(problem.moving),
             ),
             by_genome,
-            ga.num_hall_teams > 0 and ga.hall_members == "front",
+            depth > 0 and ga.hall_members == "front",
         )
-        self._num_teams = np.zeros(1, dtype=np.int64)
+        # uniform numbers that a generation takes at most
+        most = int(np.count_nonzero(problem.moving))
+        most *= int(self._heredity.breeding.sizes.sum(axis=1).max())
+        self._most_drawn = max(most, robots * num_genes * self._size)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial populations."""
-        self._table.populations[0] = self._planner.sample(self._problem, rng, self._size)
-        self._judge(0)
-        most = int(np.count_nonzero(self._problem.moving))
-        most *= int(self._heredity.breeding.sizes.sum(axis=1).max())
-        self._most_drawn = max(most, self._table.populations[0].size)
+        self._judge(self._planner.sample(self._problem, rng, self._size), 0)
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Breed and judge the generation behind one."""
+        """Breed and judge the generation behind one, or begin anew."""
         state, uniforms = rng.bit_generator.state, rng.random(self._most_drawn)
-        taken = self._follow(uniforms, first)
-        rng.bit_generator.state = state  # the generator goes on behind the numbers that were taken
-        rng.random(taken)
-        self._judge(last % self.num_places)
-        return last
-
-    def _follow(self, uniforms: FloatArray, index: int) -> int:
-        """Breed the generation behind one, or begin anew; return how many numbers that took."""
         self._waiting, ga = 0 if self.keeper.best.solved else self._waiting + 1, self._planner.ga
         if ga.restart_after is None or self._waiting < ga.restart_after:
-            rate, (select, cross, mutate) = ga.mutation_rate_at(index + 1), self._operators
-            rules = self._heredity, self._table, self._num_teams
-            return int(follow(select, cross, mutate, uniforms, index, rate, *rules))
-        # "If no convergence has occurred, …, the algorithm generates new populations" (section 3)
-        populations = self._table.populations[(index + 1) % self.num_places]
-        own = uniforms[: populations.size].reshape(populations.shape)
-        populations[:] = self._planner.populations_of(self._problem, own)
-        self._waiting = self._num_teams[0] = 0
-        return int(populations.size)
+            rate, rules = ga.mutation_rate_at(last), (self._heredity, self.present)
+            populations, taken = follow(*self._operators, uniforms, first, rate, *rules)
+        else:
+            # "If no convergence has occurred, …, the algorithm generates new populations" (section
+            # 3)
+            shape = self.present.populations.shape
+            taken = math.prod(shape)
+            own = uniforms[:taken].reshape(shape)
+            populations = self._planner.populations_of(self._problem, own)
+            self._waiting = self._heredity.hall.num_teams[0] = 0
+        rng.bit_generator.state = state  # the generator goes on behind the numbers that were taken
+        rng.random(taken)
+        self._judge(populations, last % self.num_places)
+        return last
 
-    def _judge(self, place: int) -> None:
-        """Evaluate the populations at a place, whatever the model is; see who is proven."""
-        populations, found = self._table.populations[place], at_place(self._table.judged, place)
-        evaluated = self._planner.evaluated(self._problem, populations)
-        for array, values in zip(found, evaluated, strict=True):
-            array[...] = values
+    def _judge(self, populations: FloatArray, place: int) -> None:
+        """Evaluate populations, whatever the model is; see who is proven."""
+        found = self._planner.evaluated(self._problem, populations)
         settled = self._proven.settle(populations, found) if self._proven else None
-        team = self._table.teams[place]
-        self._table.team_costs[place] = survey(found, team, self.summaries[place])
-        if settled is not None:
-            team[:], self._table.team_costs[place] = settled
+        best = survey(found, self.summaries[place])
+        self.present, self.costs[place] = (
+            Generation(populations, found, settled or best),
+            found.costs,
+        )
 
     def lowest(self, places: IntArray) -> FloatArray:
-        """Return the costs of the best teams."""
-        return np.asarray(self._table.team_costs[places])
+        """Return the cost of the best team."""
+        return np.array([self.present.best.cost])
 
     def best(self, place: int) -> Candidate:
         """Return the best team, or the best of every population where no team was found."""
-        found = at_place(self._table.judged, place)
-        best = BestTeam(self._table.teams[place], self._table.team_costs.item(place))
+        populations, found, best = self.present
         team = best.individuals if best.found else found.costs.argmin(axis=1)
-        populations = self._table.populations[place]
         solution = self._planner.team_solution(self._problem, populations, team)
         return Candidate(solution, found.terms_of(team), best.found)
 
@@ -203,11 +272,11 @@ class TeamSearch(TableSearch):
 
     def population(self, index: int) -> FloatArray:
         """Return the populations."""
-        return np.asarray(self._table.populations[index % self.num_places])
+        return self.present.populations
 
     def criteria(self, place: int) -> FloatArray | None:
         """Return the criteria of all individuals."""
-        return np.asarray(self._table.judged.criteria[place])
+        return self.present.judged.criteria
 
 
 class ProvenTeams:

@@ -10,12 +10,18 @@ import numpy as np
 
 from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
 from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
-from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
-from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.hall_of_fame import Hall, HallRules, rate_team, renew_hall
 from evoexp.evolution.operators.breeding import Breeding
-from evoexp.evolution.pareto import pareto_front
-from evoexp.evolution.succession import choose_elites
+from evoexp.evolution.succession import choose_elites, cost_statistics, pareto_front
+from evoexp.evolution.teams import (
+    BestTeam,
+    CollisionCounts,
+    Hall,
+    HallRules,
+    best_team,
+    pair_index,
+    rate_team,
+    renew_hall,
+)
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions
@@ -35,13 +41,12 @@ class Evaluated(NamedTuple):
     blocked: IntArray  # (robots, individuals) configurations that collide with obstacles
 
     @classmethod
-    def room(cls, *shape: int) -> Self:
-        """Return memory for populations of a shape (…, robots, individuals)."""
-        *places, robots, count = shape
-        own, costs = np.empty((2, *shape))
-        pairs = np.empty((*places, robots * (robots - 1) // 2, count, count), dtype=np.int16)
-        blocked = np.zeros(shape, dtype=np.int64)
-        return cls(costs, np.empty((*places, robots, 4, count)), own, pairs, blocked)
+    def room(cls, robots: int, count: int) -> Self:
+        """Return memory for populations of `count` individuals."""
+        own, costs = np.empty((2, robots, count))
+        pairs = np.empty((robots * (robots - 1) // 2, count, count), dtype=np.int16)
+        blocked = np.zeros((robots, count), dtype=np.int64)
+        return cls(costs, np.empty((robots, 4, count)), own, pairs, blocked)
 
     @property
     def teamable(self) -> FloatArray:
@@ -92,6 +97,14 @@ class Evaluated(NamedTuple):
         return terms
 
 
+class Generation(NamedTuple):
+    """Populations, judged."""
+
+    populations: FloatArray  # (robots, 2 K, individuals)
+    judged: Evaluated  # all against all
+    best: BestTeam  # the best team, if there is one
+
+
 class Heredity(NamedTuple):
     """The rules by which one generation follows another."""
 
@@ -131,17 +144,14 @@ def count_members(teams: IntArray, robot: int) -> int:
 
 
 @kernel
-def copy_fronts(populations: FloatArray, judged: Evaluated, heredity: Heredity) -> int:
+def copy_fronts(present: Generation, heredity: Heredity) -> None:
     """Let the hall hold the front of each population, the cheapest if it has too few places.
 
     "The Pareto front is copied to the next generation. The size of the front is limited"
-    (section 3). Populations are (robots, genes, individuals). Where a front is smaller than
-    others, members −1 stand at the end.
-
-    Returns:
-        Number of rows of the hall that are used.
+    (section 3). Where a front is smaller than others, members −1 stand at the end.
     """
-    criteria, costs, teams, used = judged.criteria, judged.costs, heredity.hall.teams, 0
+    (populations, judged, _), teams, used = present, heredity.hall.teams, 0
+    criteria, costs = judged.criteria, judged.costs
     fronts = np.empty(costs.shape, dtype=np.bool_)
     for robot in range(len(populations)):
         fronts[robot] = pareto_front(criteria[robot])
@@ -156,35 +166,30 @@ def copy_fronts(populations: FloatArray, judged: Evaluated, heredity: Heredity) 
         for k in range(held):
             teams[k, robot] = front[order[k]]
         used = max(used, held)
-    return used
+    heredity.hall.num_teams[0] = used
 
 
 @kernel
-def renew(
-    populations: FloatArray,  # (robots, genes, individuals)
-    judged: Evaluated,  # of them
-    best: IntArray,  # (robots,) the best team; −1 if there is none
-    num_teams: int,  # teams of the hall at present
-    heredity: Heredity,  # the hall and its rules
-) -> int:
+def renew(present: Generation, heredity: Heredity) -> None:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
 
     Members of the fronts are offered with their best collaborators. With distinct genomes the best
     team of the generation is offered as it is, so that it is never lost; and a robot that stands
-    still, which has one genome, may be in all teams. Returns how many teams the hall holds then.
+    still, which has one genome, may be in all teams.
     """
-    hall, criteria, collisions = heredity.hall, judged.criteria, judged.collisions
+    (populations, judged, best), hall, criteria = present, heredity.hall, present.judged.criteria
+    teams = hall.teams[: hall.num_teams[0]]
     own = teamable_costs(judged.own, judged.blocked)
     fronts = np.empty(own.shape, dtype=np.bool_)
     for robot in range(len(populations)):
         fronts[robot] = pareto_front(criteria[robot])
     if heredity.by_genome:
-        merge_copies(populations, criteria[:, 1], hall.teams[:num_teams], fronts)
-        offered = best
+        merge_copies(populations, criteria[:, 1], teams, fronts)
+        offered = best.individuals
     else:
-        drop_copies(populations, hall.teams[:num_teams], fronts)
+        drop_copies(populations, teams, fronts)
         offered = np.full(len(populations), -1)
-    return int(renew_hall(collisions, own, fronts, hall, num_teams, offered, heredity.rules))
+    renew_hall(judged.collisions, own, fronts, hall, offered, heredity.rules)
 
 
 @kernel
@@ -318,18 +323,15 @@ def count_crossings(
 
 
 @kernel
-def survey(found: Evaluated, team: IntArray, summary: FloatArray) -> float:
-    """Write the best team (robots,), −1 if there is none, and a summary; return the team's cost.
+def survey(found: Evaluated, summary: FloatArray) -> BestTeam:
+    """Return the best team, and write a summary.
 
-    The summary: index of the best individual of all populations, mean and deviation of all costs,
-    and how many of the first robot have a collision-free partner in every population.
+    It is: index of the best individual of all populations, mean and deviation of all costs, and how
+    many of the first robot have a collision-free partner in every population.
     """
-    teamable = teamable_costs(found.own, found.blocked)
-    best = best_team(found.collisions, teamable)
-    team[:] = best.individuals
     summary[0], summary[1], summary[2] = cost_statistics(found.costs.reshape(-1))
     summary[3] = count_partnered(found.collisions, found.blocked)
-    return best.cost
+    return best_team(found.collisions, teamable_costs(found.own, found.blocked))
 
 
 @kernel

@@ -10,7 +10,8 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 (robots × (K + 2) × 2) [deg], start and goal included.
 """
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -24,7 +25,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.answers import in_shape, of_limits, of_place
-from evoexp.planners.coevolution.generations import ProvenTeams, TeamSearch
+from evoexp.planners.coevolution.generations import CoevolutionSettings, ProvenTeams, TeamSearch
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Evaluated,
@@ -32,18 +33,70 @@ from evoexp.planners.coevolution.kernels import (
     count_crossings,
     measure,
 )
-from evoexp.planners.coevolution.settings import CoevolutionSettings, SpeedLimit, length_notes
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.motion_tasks import LinkMotion
-from evoexp.validation import Component, LayoutCount
+from evoexp.validation import Component, LayoutCount, Positive, Settings
 
+# [deg] section 2: the "angles calculated", for l1 = l2 = 0.25 m, 5 m/s, 0.01 s
+PRINTED_STEPS = (11.5, 23.0)
+# [-] section 2: the "resulting chromosome length", from boundary to boundary of the half-plane
+PRINTED_LENGTH = 32
+HALF_TURN_DEG = 180.0  # [deg]
 REFUSED = (
     f"points and bases must be finite and below 1e70, at most {MOST_CONFIGURATIONS} configurations"
 )
 PAIR_BYTES = 7  # of a pair of individuals: collisions in two generations, whether they are a team
+
+
+class SpeedLimit(Settings):
+    """How fast the end-effector may be, and how often it is told where to go."""
+
+    tcp_speed: Positive  # V_max, greatest speed of the tool centre point [length unit/s]
+    sampling_time: Positive  # T, between two configurations [s]
+
+    def greatest_steps(self, lengths: Sequence[float]) -> tuple[float, float]:
+        """Return the largest turn of either link alone between two configurations (Eq. 2) [deg]."""
+        travel = self.tcp_speed * self.sampling_time
+        return travel / (lengths[0] + lengths[1]) / DEGREE, travel / lengths[1] / DEGREE
+
+
+def needed_length(turn: float, greatest_step: float) -> int:
+    """Return the next even chromosome length for a turn by greatest steps [deg] (Eq. 3)."""
+    genes = math.ceil(2.0 * turn / greatest_step * (1.0 - 1e-12))  # a whole number stays whole
+    return max(2, genes + genes % 2)
+
+
+def length_notes(
+    limit: SpeedLimit,
+    lengths: Sequence[Sequence[float]],
+    start: FloatArray,
+    goal: FloatArray,
+    chromosome_length: int,
+) -> list[str]:
+    """Compare this chromosome, line by line, with Eqs. 2 and 3 and with the paper's numbers.
+
+    Lengths of the links are (robots, 2) [length unit], start and goal (robots, 2) [rad].
+    """
+    notes = []
+    segments = chromosome_length // 2 + 1
+    for r, links in enumerate(lengths):
+        first, second = limit.greatest_steps(links)
+        turn = float(abs(goal[r] - start[r]).max()) / DEGREE
+        asked, worst = needed_length(turn, first), needed_length(HALF_TURN_DEG, first)
+        step = turn / segments
+        verdict = f"violates it {step / first:.3g} times over" if step > first else "is within it"
+        notes += [
+            f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "
+            f"(printed: {PRINTED_STEPS[0]:g} and {PRINTED_STEPS[1]:g})",
+            f"robot {r + 1}: Eq. 3 asks for L = {asked} here ({turn:g} deg), for L = {worst} over "
+            f"{HALF_TURN_DEG:g} deg (printed: {PRINTED_LENGTH})",
+            f"robot {r + 1}: L = {chromosome_length} (K = {segments - 1}) takes steps of "
+            f"{step:.2f} deg at best, which {verdict}",
+        ]
+    return notes
 
 
 class Problem(NamedTuple):
@@ -134,7 +187,10 @@ class Coevolution(PlannerDefaults, Component):
     def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
         """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
         collision, (robots, _, count) = problem.collision, populations.shape
-        found, task = Evaluated.room(robots, count), self.task(problem)
+        weights = self.objective.own_weights, self.objective.collision_weight
+        envelope = self.collision.half_width, self.collision.tcp_radius
+        task = LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
+        found = Evaluated.room(robots, count)
         # paths, and C2 … C4 (Eqs. 6–8)
         shape, is_lines = (robots, self.num_configurations + 2), collision.is_lines
         paths, outlines = np.empty((*shape, 2, count)), np.empty((*shape, 4, count))
@@ -149,12 +205,6 @@ class Coevolution(PlannerDefaults, Component):
         if not (fits and count_crossings(outlines, int(is_lines), task, found)):
             raise ValueError(REFUSED)
         return found
-
-    def task(self, problem: Problem) -> LineTask:
-        """Return the robots and the weights of their criteria, as kernels take them."""
-        weights = self.objective.own_weights, self.objective.collision_weight
-        envelope = self.collision.half_width, self.collision.tcp_radius
-        return LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

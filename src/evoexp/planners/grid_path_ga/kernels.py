@@ -1,18 +1,16 @@
 """Generations of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
-A path is a row of a table, see `paths.grid_walks`.
+A path is a row of a table, see `paths.grids`.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
+from evoexp.evolution.succession import choose_parents, summarise
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
-from evoexp.paths.grid_walks import measure_path
-from evoexp.paths.grids import NodeArray
+from evoexp.paths.grids import NodeArray, measure_path
 from evoexp.planners.driver import TableSearch
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,
@@ -105,20 +103,19 @@ def advance(
     breeding: Breeding,  # settings of the operators
     population: Population,
     following: Population,  # written
-    chosen: SelectionMemory,  # parents and elites, written
     scratch: Scratch,  # of the operators
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
     Returns whether the draws sufficed; if not, what is written is not complete.
     """
-    draws, world, population, following, chosen, scratch = borrowed(
-        (draws, world, population, following, chosen, scratch)
-    )
+    draws, world, scratch = borrowed((draws, world, scratch))
+    population, following = borrowed((population, following))
     (paths, results), (children, values) = population, following
-    parents, elites, count = chosen.parents, chosen.elites, len(chosen.parents)
-    if not choose_parents(draws, results[COST], breeding.multiple, chosen):
+    parents, elites = choose_parents(draws, results[COST], breeding.multiple, breeding.num_elites)
+    if used_up(draws):
         return False
+    count = len(parents)
     for first in range(0, count, 2):
         # crossover of a pair
         crossed = False

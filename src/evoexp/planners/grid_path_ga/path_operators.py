@@ -1,16 +1,15 @@
 """Crossover and mutation of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
-A path is a row of a table, see `paths.grid_walks`.
+A path is a row of a table, see `paths.grids`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import copy_part, inlined, kernel
+from evoexp.numeric.compilation import copy_part, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
-from evoexp.paths.grid_walks import SumArray, erase_loops, walk
-from evoexp.paths.grids import Moves, NodeArray, spread_front
+from evoexp.paths.grids import Moves, NodeArray, SumArray, erase_loops, spread_front, walk
 from evoexp.records import FloatArray, IntArray
 
 NOT_CONNECTED, CONNECTED = -1, -2
@@ -35,6 +34,7 @@ class Breeding(NamedTuple):
     """Settings of the operators."""
 
     erase: bool  # whether loops are erased
+    num_elites: int
     multiple: float  # copies that the best one expects, in units of the mean
     crossover_rate: float  # probability per pair
     reach: int  # how far apart two nodes may be, in every coordinate, to cross paths there [cell]
@@ -93,7 +93,8 @@ def cross(
     place, joined, sites, erase = scratch.place, scratch.joined, scratch.sites, breeding.erase
     count = coincident_sites(one, two, scratch.seen, sites)
     if count > 0:  # at a common node, which stays once
-        i, j = places_of(sites[draw_index(draws, count)])
+        site = sites[draw_index(draws, count)]
+        i, j = site >> PLACE_BITS, site & (2**PLACE_BITS - 1)
         link, behind = CONNECTED, 1
     else:  # at two near nodes
         i, j = near_sites(draws, world.coordinates, one, two, breeding.reach)
@@ -105,12 +106,6 @@ def cross(
     settle(joined, _join(one, i, link, two, j + behind, joined), erase, children[0], place)
     settle(joined, _join(two, j, link, one, i + behind, joined), erase, children[1], place)
     return True
-
-
-@inlined
-def places_of(site: int) -> tuple[int, int]:
-    """Return the places of a common node in the first path and in the second."""
-    return site >> PLACE_BITS, site & (2**PLACE_BITS - 1)
 
 
 @kernel

@@ -4,25 +4,36 @@ Chen & Zalzala 1995, section 2. Every individual is a path of neighbouring nodes
 valid by construction: random walks make permitted moves, and crossover and mutation join them. Its
 cost is the weighted sum of its length and the mean unsafeness of its nodes.
 
-A population is a table of whole numbers, see `paths.grid_walks`; a solution is flat: the
+A population is a table of whole numbers, see `paths.grids`; a solution is flat: the
 coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
 """
 
 import functools
 from collections.abc import Iterator
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Part, Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.operators.breeding import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
-from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all
-from evoexp.paths.grids import UNREACHED, Grid, Moves, NodeArray, spread_front
+from evoexp.paths.grids import (
+    LANES,
+    UNREACHED,
+    WORDS,
+    Grid,
+    Moves,
+    NodeArray,
+    SumArray,
+    spread_front,
+    walk,
+    walk_all,
+    weigh_all,
+)
 from evoexp.paths.motion import Motion
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels
@@ -42,7 +53,7 @@ from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
 from evoexp.robots.mobile_robots import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
-from evoexp.validation import Component, NonNegativeCount
+from evoexp.validation import Component, NonNegative, NonNegativeCount
 
 FEW_NODES = 1200  # weights of moves toward all nodes of smaller grids are kept: 12 MB of a floor
 MOST_NODES = 2**15  # of a grid whose first paths walkers draw in turns
@@ -53,6 +64,26 @@ PER_CALL = 8  # generations; see `ScaledSearch`: another number needs another re
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
 MORE_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 BLOCK = 16384  # uniform numbers drawn at once, at least
+
+
+class PathCost(Component):
+    """Weights of Eq. 1, C = ε D + λ S."""
+
+    component: ClassVar[str] = "path_cost"
+
+    distance_weight: NonNegative  # ε, of the length D (Eq. 2) [1/cell]
+    unsafeness_weight: NonNegative  # λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-]
+
+    @model_validator(mode="after")
+    def _something_costs(self) -> Self:
+        must = "above 0, or unsafeness_weight is: else all paths cost 0"
+        self.demand("distance_weight", any(self.weights), must)
+        return self
+
+    @property
+    def weights(self) -> tuple[float, float]:
+        """(ε, λ), as kernels take them."""
+        return self.distance_weight, self.unsafeness_weight
 
 
 class Problem(NamedTuple):
@@ -205,6 +236,7 @@ class _Search(PathTable, ScaledSearch):
         )
         breeding = Breeding(
             not planner.revisits,
+            ga.num_elites,
             ga.scaling_multiple,
             ga.crossover_rate,
             planner.crossover_reach,
@@ -213,7 +245,6 @@ class _Search(PathTable, ScaledSearch):
         self._settings, self._scratch = (planner.objective.weights, breeding), Scratch.of(nodes)
 
     def begin(self, rng: np.random.Generator) -> None:
-        """Draw and measure the initial population."""
         paths, results = present = self.at(0)
         drawn = self._planner.sample(self._problem, rng, len(paths))
         paths[:, : drawn.shape[1]] = drawn
@@ -221,13 +252,11 @@ class _Search(PathTable, ScaledSearch):
         self.note(present, 0)
 
     def breed(self, present: Population, following: Population) -> bool:
-        """Write the population that follows another."""
         rules, populations = self._settings, (present, following)
         task = self.draws.block, self._problem.world
-        return bool(kernels.advance(*task, *rules, *populations, self.chosen, self._scratch))
+        return bool(kernels.advance(*task, *rules, *populations, self._scratch))
 
     def note(self, population: Population, place: int) -> None:
-        """Write the record of a generation to a place."""
         kernels.note(population, place, self.recorded, self.summaries)
 
     def population(self, index: int) -> NodeArray:

@@ -17,16 +17,26 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.placement_criteria import PlacementCriteria
-from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
+from evoexp.evolution.operators.breeding import ScaledGenetic
+from evoexp.evolution.succession import choose_parents, summarise
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.elementary import DEGREE, log
+from evoexp.numeric.random_stream import Block as Uniforms
+from evoexp.numeric.random_stream import draw, draw_many, used_up
+from evoexp.objectives.placement_criteria import (
+    COST,
+    CRITERIA,
+    PLATFORM,
+    THETA_3,
+    TORQUE,
+    Model,
+    PlacementCriteria,
+    Task,
+    measure_postures,
+)
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
-from evoexp.planners.placement_ga import kernels
-from evoexp.planners.placement_ga.kernels import GENES, ROWS, Coding, Population
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
@@ -35,11 +45,143 @@ from evoexp.robots.mobile_robots import MobileArm
 from evoexp.scenarios.motion_tasks import Docking
 from evoexp.validation import Component, Limits
 
+GENES = 2  # θ1, θ2
+ROWS = GENES + CRITERIA + 1  # angles [deg], criteria, branch of θ3
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
 PER_CALL = 16  # generations; see `ScaledSearch`: another number needs another revision
 BLOCK = 8192  # uniform numbers drawn at once, at least
+
+
+class Coding(NamedTuple):
+    """The meaning of strings, and settings of the operators."""
+
+    bits: int  # B ≤ 52 per gene, a number in [0, 2^B); its highest bit comes first
+    gray: bool  # whether they are reflected Gray codes
+    limits: FloatArray  # (2, 2) of the angles [deg]
+    num_elites: int
+    multiple: float  # copies that the best one expects, in units of the mean
+    crossover_rate: float  # probability per pair
+    mutation_rate: float  # probability per bit
+
+
+class Population(NamedTuple):
+    """One generation; or all of several, with a first axis of places."""
+
+    strings: IntArray  # (2, individuals)
+    rows: FloatArray  # (ROWS, individuals)
+
+
+@kernel
+def advance(
+    draws: Uniforms,
+    coding: Coding,  # the meaning of strings, and settings of the operators
+    model: Model,  # task, weights and limits of the criteria
+    population: Population,
+    following: Population,  # written
+) -> bool:
+    """Write the population that follows another: its offspring, then the elites, best first.
+
+    Returns whether the draws sufficed; if not, what is written is not complete.
+    """
+    draws, coding, model = borrowed((draws, coding, model))
+    population, following = borrowed((population, following))
+    strings, rows, children = population.strings, population.rows, following.strings
+    costs = rows[GENES + COST]
+    parents, elites = choose_parents(draws, costs, coding.multiple, coding.num_elites)
+    if used_up(draws):
+        return False
+    count = len(parents)
+    crossing = draw_many(draws, 2 * (count // 2))
+    if used_up(draws):
+        return False
+    # crossover, mutation, criteria
+    cross_strings(crossing, strings, coding, parents, children)
+    flip_strings(draws, children, coding, count)
+    if used_up(draws):
+        return False
+    judge(children, coding, model, count, following.rows)
+    # elites
+    for e in range(len(elites)):
+        for gene in range(GENES):
+            children[gene, count + e] = strings[gene, elites[e]]
+        for row in range(ROWS):
+            following.rows[row, count + e] = rows[row, elites[e]]
+    return True
+
+
+@kernel
+def decode_strings(strings: IntArray, count: int, coding: Coding, out: FloatArray) -> None:
+    """Decode numbers n of B bits of the first individuals: l + (h − l) n / (2^B − 1)."""
+    greatest = float((1 << coding.bits) - 1)
+    for gene in range(len(strings)):
+        low, high = coding.limits[gene, 0], coding.limits[gene, 1]
+        for k in range(count):
+            number = strings[gene, k]
+            if coding.gray:  # a bit is the parity of its own Gray bit and all above it
+                for shift in (1, 2, 4, 8, 16, 32):
+                    number ^= number >> shift
+            out[gene, k] = low + (high - low) * (float(number) / greatest)
+
+
+@kernel
+def cross_strings(
+    uniforms: FloatArray,  # (2 × pairs,): decision, site
+    strings: IntArray,  # (genes, individuals)
+    coding: Coding,
+    parents: IntArray,  # (offspring,) indices of individuals
+    out: IntArray,  # (genes, ≥ offspring), written
+) -> None:
+    """Cut pairs of parents at one site and exchange their tails (Chen & Zalzala 1995, section 3.2).
+
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut before one of the
+    bits 1 … all − 1, each equally likely, or copied.
+    """
+    genes, count, bits = len(strings), len(parents), coding.bits
+    # copies of the parents
+    for gene in range(genes):
+        for k in range(count):
+            out[gene, k] = strings[gene, parents[k]]
+    # pairs exchange the bits behind their site, gene by gene
+    last = genes * bits - 1
+    for pair in range(count // 2):
+        first, second = 2 * pair, 2 * pair + 1
+        if last > 0 and uniforms[first] < coding.crossover_rate:
+            site = 1 + min(int(uniforms[second] * last), last - 1)
+            for gene in range(genes):
+                behind = min(max((gene + 1) * bits - site, 0), bits)
+                different = (out[gene, first] ^ out[gene, second]) & ((1 << behind) - 1)
+                out[gene, first] ^= different
+                out[gene, second] ^= different
+
+
+@kernel
+def flip_strings(draws: Uniforms, strings: IntArray, coding: Coding, count: int) -> None:
+    """Flip every bit of the first `count` strings with probability p, in place (Holland 1975).
+
+    The number of bits that stay before the next flipped one is geometrically distributed, ⌊ln(1 −
+    u) / ln(1 − p)⌋ (Devroye 1986, section X.2); so a uniform number is taken per flipped bit.
+    """
+    bits, num = coding.bits, len(strings) * coding.bits
+    staying, place = (
+        log(1.0 - coding.mutation_rate),
+        -1,
+    )  # −inf: each is flipped
+    while staying < 0.0:
+        passed = log(1.0 - draw(draws)) / staying
+        if not passed < num * count - 1 - place:
+            break
+        place += 1 + int(passed)
+        individual, bit = place // num, place % num
+        strings[bit // bits, individual] ^= 1 << (bits - 1 - bit % bits)
+
+
+@kernel
+def judge(strings: IntArray, coding: Coding, model: Model, count: int, rows: FloatArray) -> None:
+    """Decode and measure the first individuals: fill their rows."""
+    decode_strings(strings, count, coding, rows[:GENES])
+    measure_postures(rows[:GENES], count, model, rows[GENES:])
 
 
 class Problem(NamedTuple):
@@ -109,13 +251,14 @@ class PlacementGa(PlannerDefaults, Component):
     def _judged(self, problem: Problem, population: np.ndarray) -> FloatArray:
         rows = np.empty((ROWS, population.shape[1]))
         strings = np.ascontiguousarray(population, dtype=np.int64)
-        kernels.judge(strings, self.strings_of(problem), problem.model, population.shape[1], rows)
+        judge(strings, self.strings_of(problem), problem.model, population.shape[1], rows)
         return rows
 
     def strings_of(self, problem: Problem) -> Coding:
         """Return the meaning of strings and the operators' settings, as the kernels take them."""
         coding, ga = (self.bits_per_gene, self.coding == "gray", problem.angle_limits), self.ga
-        return Coding(*coding, ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
+        rates = ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate
+        return Coding(*coding, ga.num_elites, *rates)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the posture as a motion that stays there; None: it is infeasible."""
@@ -173,30 +316,24 @@ class _Search(ScaledSearch):
         self.costs = self.table.rows[:, FIRST_CRITERION]
 
     def begin(self, rng: np.random.Generator) -> None:
-        """Draw and judge the initial population."""
         strings, rows = present = self.at(0)
         strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
-        kernels.judge(strings, *self._judging, strings.shape[1], rows)
+        judge(strings, *self._judging, strings.shape[1], rows)
         self.note(present, 0)
 
     def breed(self, present: Population, following: Population) -> bool:
-        """Write the population that follows another."""
-        draws, chosen = self.draws.block, self.chosen
-        return bool(kernels.advance(draws, *self._judging, present, following, chosen))
+        return bool(advance(self.draws.block, *self._judging, present, following))
 
     def note(self, population: Population, place: int) -> None:
-        """Summarise a generation at a place."""
         rows = population.rows
         summarise(rows[FIRST_CRITERION], rows[-1] >= 0.0, self.summaries[place])
 
     def candidate(self, place: int, individual: int) -> Candidate:
-        """Return angles, criteria and whether the posture is feasible."""
         angles = self.table.rows[place, :GENES, individual].copy()
         _, *criteria, branch = self.table.rows[place, FIRST_CRITERION:, individual].tolist()
         return Candidate(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
 
     def population(self, index: int) -> IntArray:
-        """Return the strings."""
         return np.asarray(self.at(index).strings)
 
 

@@ -83,13 +83,6 @@ class Memory(NamedTuple):
     feasible: BoolArray  # (offspring,)
     met: BoolArray  # (offspring,) whether each meets the goal
 
-    @classmethod
-    def of(cls, nq: int, count: int) -> "Memory":
-        """Return memory for `count` individuals."""
-        flags = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-        origin = np.empty(count, dtype=np.int64)
-        return cls(np.empty((nq, count)), origin, np.empty((ROWS, count)), *flags)
-
 
 @kernel
 def judge(

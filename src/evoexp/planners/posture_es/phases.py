@@ -25,7 +25,6 @@ from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, obstacle_hu
 from evoexp.scenarios.posture_task import (
     Phase,
     PlaceGoal,
-    PointGoal,
     PoseGoal,
     PostureTask,
     ShiftGoal,
@@ -281,46 +280,33 @@ class Problem:
         controlled: tuple[int, FloatArray],
     ) -> Aim:
         """Return the goal of a phase that begins at posture q, as the kernels take it."""
-        goal, rotation = phase.goal, IDENTITY[:9].copy()
-        point, axis = np.zeros(3), np.zeros(3)
-        surface, half_length, radius, half_edges = POINT, 0.0, 0.0, np.zeros(3)
-        up = np.array(self.task.up)
+        goal, up = phase.goal, np.array(self.task.up)
         up = up / np.sqrt(np.sum(up * up))
-        if isinstance(goal, PointGoal | PoseGoal | PlaceGoal):
-            point = np.array(goal.point, dtype=np.float64)
-        if isinstance(goal, PointGoal) and goal.radius > 0.0:
-            surface, radius = ROD, goal.radius
-        if isinstance(goal, PlaceGoal):
-            surface, radius, axis = ROUND, goal.radius, up
-        if isinstance(goal, PoseGoal):
-            rotation = np.array(rotation_matrix(goal.rotation), dtype=np.float64).ravel()
+        own_up = OBJECT_UP if situation.held >= 0 else TOOL_UP
+        turn, zero = IDENTITY[:9].copy(), np.zeros(3)
         if isinstance(goal, ShiftGoal):
             table = self.assembly.table
-            now = frame_pose(table, *controlled, q)
-            way = np.array(goal.offset, dtype=np.float64)
+            now, way = frame_pose(table, *controlled, q), np.array(goal.offset, dtype=np.float64)
             if goal.frame == "tool":
                 tool = frame_pose(table, *self.tool, q)
-                way = compose(tool, np.concatenate([IDENTITY[:9], way]))[9:] - tool[9:]
-            rotation, point = now[:9].copy(), now[9:] + way
+                way = compose(tool, np.concatenate([turn, way]))[9:] - tool[9:]
+            return Aim(now[:9].copy(), now[9:] + way, zero, POINT, 0.0, 0.0, zero, up, own_up)
         if isinstance(goal, SurfaceGoal):
             k = self.task.names.index(goal.object)
             pose, kind, size = situation.poses[k], self.obstacles.kind[k], self.obstacles.size[k]
-            rotation, point, axis = pose[:9].copy(), pose[9:].copy(), pose[[2, 5, 8]]
+            place = pose[:9].copy(), pose[9:].copy(), pose[[2, 5, 8]]
             if kind == BOX:
-                surface, half_edges = EDGED, size.copy()
-            else:
-                surface, half_length, radius = ROUND if kind == CYLINDER else ROD, size[1], size[0]
-        return Aim(
-            rotation,
-            point,
-            axis,
-            surface,
-            float(half_length),
-            float(radius),
-            half_edges,
-            up,
-            OBJECT_UP if situation.held >= 0 else TOOL_UP,
-        )
+                return Aim(*place, EDGED, 0.0, 0.0, size.copy(), up, own_up)
+            surface = ROUND if kind == CYLINDER else ROD
+            return Aim(*place, surface, float(size[1]), float(size[0]), zero, up, own_up)
+        point = np.array(goal.point, dtype=np.float64)
+        if isinstance(goal, PoseGoal):
+            turn = np.array(rotation_matrix(goal.rotation), dtype=np.float64).ravel()
+            return Aim(turn, point, zero, POINT, 0.0, 0.0, zero, up, own_up)
+        if isinstance(goal, PlaceGoal):
+            return Aim(turn, point, up, ROUND, 0.0, goal.radius, zero, up, own_up)
+        surface = ROD if goal.radius > 0.0 else POINT
+        return Aim(turn, point, zero, surface, 0.0, goal.radius, zero, up, own_up)
 
     def _held_pose(self, situation: Situation) -> tuple[int, FloatArray]:
         """Return Pinocchio's index of the tool's joint, and the held object's pose (12,) in it."""
@@ -337,7 +323,6 @@ class Problem:
 
 
 def _are_among(phase: Phase, one: str, two: str) -> bool:
-    """Return whether two bodies may touch in a phase."""
     return any({one, two} == set(pair) for pair in phase.contacts)
 
 

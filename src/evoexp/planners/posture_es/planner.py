@@ -15,26 +15,23 @@ is searched, the plan's cost is inf. Individuals that collide or pass a hard lim
 parents; means and deviations leave them out.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
 from evoexp.collision.bodies.body_models import CollisionModel
-from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part
-from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing, in_shape, of_postures
-from evoexp.planners.arm_tasks import cover_shapes
-from evoexp.planners.moveit_tasks import hull_notes
-from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
-from evoexp.planners.posture_es.cycles import Node, Search, StrategySettings
+from evoexp.planners.arm_tasks import cover_shapes, hull_notes
+from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults
+from evoexp.planners.posture_es.cycles import Search, StrategySettings, named, path_terms
 from evoexp.planners.posture_es.kernels import COST
-from evoexp.planners.posture_es.phases import Problem, Span, Stage
+from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.planners.posture_es.problem import prepare
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Block, FloatArray
@@ -45,7 +42,6 @@ from evoexp.validation import Component, NonNegativeCount, Positive
 
 TERM_VALUES = 60  # numbers kept for an individual: terms, and what the kernels note of it
 DENSE = 50  # configurations per step at which tilts of the continuous motion are sampled
-OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
 
 
 class PostureEs(PlannerDefaults, Component):
@@ -76,24 +72,7 @@ class PostureEs(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
-        paths = _Paths(self, problem)
-        node, situation = Node(problem.start), problem.first_situation
-        for index in range(len(problem.phases)):
-            stage = problem.begin(index, node.posture, situation)
-            accepts = self._proves(problem, stage) if self.answers_are_proven else None
-            search = Search(self.ga, problem, stage, self.edge_check, node, accepts)
-            last = index == len(problem.phases) - 1
-            while True:
-                reason = search.stop_reason
-                ends = bool(reason) and (last or reason != "goal")
-                yield paths.record(search, index, reason if ends else "")
-                if reason:
-                    break
-                search.advance(rng)
-            if not search.won:
-                return
-            node = search.best
-            situation = problem.finish(stage, node.posture)
+        return Search(self, problem).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures uniform within the joint limits, (nq, count)."""
@@ -111,14 +90,6 @@ class PostureEs(PlannerDefaults, Component):
         cost = np.where(judged.feasible, judged.cost, np.inf)
         terms = {COLUMNS[k]: judged.rows[k] for k in self.chosen} | {"cost": judged.cost}
         return JudgementArrays(cost, judged.met, len(cost), terms)
-
-    def _proves(self, problem: Problem, stage: Stage) -> Callable[[FloatArray, FloatArray], bool]:
-        """Return the proof of the way from a parent (nq,) to its child in a phase."""
-        part, margin = Part(problem.scene_of(stage), 0, 1), self.security_margin(problem)
-        by_margin = self.acceptance == "margin"
-        return lambda parent, child: is_proven(
-            (part,), Motion(np.array([parent, child])), margin, by_margin
-        )
 
     @property
     def chosen(self) -> tuple[int, ...]:
@@ -210,60 +181,6 @@ class PostureEs(PlannerDefaults, Component):
 
     def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
         return in_shape(solution, -1, len(problem.start))
-
-
-class _Paths:
-    """The path to the best posture so far, and the records of generations."""
-
-    def __init__(self, planner: PostureEs, problem: Problem) -> None:
-        self._planner, self._problem, self._keeper = planner, problem, Keeper()
-        self._node, self._path, self._cycles = Node(problem.start), dict[str, float](), 0
-        self._chosen = planner.chosen
-
-    def record(self, search: Search, phase: int, stop_reason: str) -> Block:
-        """Return the record of the last cycle, or of the posture that a phase begins with."""
-        problem, planner, keeper = self._problem, self._planner, self._keeper
-        last, several = phase == len(problem.phases) - 1, len(problem.phases) > 1
-        self._cycles += min(search.cycles, 1)
-        # the best so far
-        solution = keeper.best.solution
-        if search.best is not self._node:
-            postures = search.best.path()
-            solution, self._node = postures.ravel(), search.best
-            self._path = path_terms(postures, problem.scope)
-        counts = {"phase": phase + 1.0, "cycles": float(self._cycles)}
-        terms = named(search.best_row, self._chosen) | self._path | counts
-        terms["idle_cycles"] = float(search.idle)
-        best = Candidate(solution, terms, search.won and last)
-        keeper.keep(search.least if last else np.inf, best)
-        # the generation
-        costs, count = search.costs, search.offspring.shape[1]
-        return keeper.record(
-            CostStatistics(0, search.mean, search.std),
-            costs[None, :] if several else costs,
-            search.offspring,
-            lowest=search.lowest if last else np.inf,
-            num_feasible=search.num_feasible,
-            evaluations=count,
-            collision_queries=count * (1 + (planner.edge_check if search.cycles else 0)),
-            stop_reason=stop_reason,
-        )
-
-
-def named(row: FloatArray, chosen: tuple[int, ...]) -> dict[str, float]:
-    """Return some terms of a posture (ROWS,) by name, and its cost."""
-    values = row.tolist()
-    return {COLUMNS[k]: values[k] for k in chosen} | {"cost": values[COST]}
-
-
-def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
-    """Return the terms of a path (postures, nq): its steps in units of the scope."""
-    steps = (np.abs(np.diff(postures, axis=0)) / scope).max(axis=1, initial=0.0)
-    return {
-        "postures": float(len(postures)),
-        "longest_step_scopes": float(steps.max(initial=0.0)),
-        "oversized_steps": float(np.count_nonzero(steps > OVERSIZED)),
-    }
 
 
 def dense(postures: FloatArray) -> FloatArray:

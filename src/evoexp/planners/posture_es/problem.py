@@ -20,7 +20,7 @@ from evoexp.objectives.posture_cost import (
     UPRIGHT,
     PostureCost,
 )
-from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
+from evoexp.planners.arm_tasks import posture_task, with_allowed_pairs
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot

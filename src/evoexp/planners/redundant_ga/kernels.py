@@ -16,15 +16,13 @@ from evoexp.collision.planar.link_ellipses import (
     check_paths,
     prepare_checks,
 )
-from evoexp.evolution.bit_coding import decode_bits
-from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.succession import choose_elites, copy_members
+from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.vectors import LANES
-from evoexp.objectives.reaching import measure_reach
+from evoexp.numeric.vectors import LANES, load, root, select, spread, store
 from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.robots.planar_ends import PlanarArm
+from evoexp.robots.kinematics import VECTOR, U
+from evoexp.robots.planar_ends import PlanarArm, block_ends, load_lanes
 
 RESULTS = 3  # last rows of a table of individuals: cost, position error, joint displacement
 
@@ -100,15 +98,11 @@ def evolve(
 
 
 @kernel
-def begin(
-    uniforms: FloatArray, sub_path: SubPath, tables: FloatArray, summaries: FloatArray
-) -> None:
+def begin(uniforms: FloatArray, sub_path: SubPath, tables: FloatArray) -> None:
     """Draw and judge the initial population by (genes · individuals,) numbers; see `evolve`."""
     size = len(sub_path.hit)
     checks = prepare_checks(len(sub_path.starts), tables.shape[2])
     draw(uniforms, size, sub_path, tables[0], checks)
-    costs = tables[0, len(tables[0]) - RESULTS, :size]
-    summarise(costs, np.isfinite(costs), summaries[0])
 
 
 @kernel
@@ -144,6 +138,25 @@ def _angles(table: FloatArray, count: int, sub_path: SubPath) -> FloatArray:
 
 
 @kernel
+def decode_bits(bits: FloatArray, count: int, limits: FloatArray, out: FloatArray) -> None:
+    """Decode plain binary numbers n of B bits, the highest first: l + (h − l) n / (2^B − 1).
+
+    From bits (genes × B, ≥ count), 0.0 or 1.0, by limits (genes, 2), to out (genes, ≥ count).
+    """
+    num = len(bits) // len(out)
+    greatest = 0.0
+    for _ in range(num):
+        greatest = 2.0 * greatest + 1.0
+    for gene in range(len(out)):
+        low, high = limits[gene, 0], limits[gene, 1]
+        for k in range(count):
+            number = 0.0
+            for bit in range(num):
+                number = 2.0 * number + bits[gene * num + bit, k]
+            out[gene, k] = low + (high - low) * (number / greatest)
+
+
+@kernel
 def succeed(
     sub_path: SubPath, population: FloatArray, following: FloatArray, checks: PathChecks
 ) -> None:
@@ -174,11 +187,39 @@ def succeed(
 def measure(
     starts: FloatArray, angles: FloatArray, count: int, judging: Judging, table: FloatArray
 ) -> None:
-    """Write Eq. 4 without collisions, and its parts, for the first `count` individuals."""
-    row, lanes = len(table) - RESULTS, np.arange(count + LANES)
-    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
-    results = table[row], table[row + 1], table[row + 2]
-    measure_reach(starts, angles, lanes, count, arm, target, box, weights, *results)
+    """Write Eqs. 4, 1 and 2 without collisions for the first `count` individuals.
+
+    The cost is inf if the tip ends outside the box; a tip on its edge is inside.
+    """
+    arm, target, box, (w1, w2) = judging.arm, judging.target, judging.box, judging.weights
+    row, rows, lanes = len(table) - RESULTS, len(starts) * LANES, np.arange(count + LANES)
+    cost, error, displacement = table[row], table[row + 1], table[row + 2]
+    begin, end, outside = np.empty(rows), np.empty(rows), spread(np.inf)
+    x, y, found = np.empty(rows + LANES), np.empty(rows + LANES), np.empty(3 * LANES)
+    for first in range(0, count, LANES):
+        # tips of a block
+        load_lanes(starts, lanes, first, count, begin)
+        load_lanes(angles, lanes, first, count, end)
+        block_ends(begin, end, arm, 1, 1, x, y)
+        # displacement (Eq. 2), position error (Eq. 1), cost (Eq. 4)
+        squares = spread(0.0)
+        for k in range(len(starts)):
+            turn = load(begin, U(k) * VECTOR) - load(end, U(k) * VECTOR)
+            squares = squares + turn * turn
+        tip_x, tip_y = load(x, U(rows)), load(y, U(rows))
+        off_x, off_y = tip_x - target[0], tip_y - target[1]
+        off, turned = root(off_x * off_x + off_y * off_y), root(squares)
+        worth = w1 * off + w2 * turned
+        worth = select(tip_x < box[0], outside, worth)
+        worth = select(box[1] < tip_x, outside, worth)
+        worth = select(tip_y < box[2], outside, worth)
+        worth = select(box[3] < tip_y, outside, worth)
+        store(found, U(0), worth)
+        store(found, VECTOR, off)
+        store(found, U(2) * VECTOR, turned)
+        for n in range(min(LANES, count - first)):
+            cost[first + n], error[first + n] = found[n], found[LANES + n]
+            displacement[first + n] = found[2 * LANES + n]
 
 
 @kernel

@@ -1,15 +1,30 @@
 """Genetic searches for the end postures of sub-paths, one after the other, and the best plan.
 
-Lavoie & Boudreau 2001.
+Lavoie & Boudreau 2001; their hyperparameters, and operators that can be chosen.
 """
 
 from collections.abc import Generator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
+from pydantic import Field
 
-from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.operators.breeding import Operators, PopulationSettings
+from evoexp.evolution.operators.crossover import (
+    ArithmeticCrossover,
+    BlxAlpha,
+    OnePoint,
+    UniformCrossover,
+)
+from evoexp.evolution.operators.mutation import (
+    BitFlips,
+    GaussianMutation,
+    NonUniformMutation,
+    UniformReset,
+)
+from evoexp.evolution.operators.operator import Crossover, Genome, Mutation, Named, Selection
+from evoexp.evolution.operators.selection import InverseRoulette, LinearRanking, Tournament
+from evoexp.evolution.succession import summarise
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.driver import GeneticSearch, generations_per_call
@@ -18,11 +33,8 @@ from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, SubPath
-from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
 from evoexp.records import Best, Block, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from evoexp.planners.redundant_ga.planner import RedundantGa
+from evoexp.validation import Count, NonNegative, NonNegativeCount, Positive
 
 TERMS = tuple(
     f"{name}_sp{path}{unit}"
@@ -31,6 +43,86 @@ TERMS = tuple(
 )  # of both sub-paths, with unit
 STRETCH = 8  # generations computed per call, at most,
 MEMORY = 2**20  # [B] whose tables should not take more than this
+
+
+class SelectiveSettings(PopulationSettings):
+    """Settings of real and of binary coding; `RealGenetic` and `BinaryGenetic` add their own.
+
+    An operator is another component, or one of these words; its settings are then those below.
+    """
+
+    # `tournament`; `roulette` with weights 1/cost; `rank`: roulette with linear weights
+    selection: Literal["tournament", "roulette", "rank"] | Named[Selection]
+    tournament_size: Count  # individuals per tournament [-]
+    # offspring expected of the best one, in linear ranking [-]
+    rank_pressure: Annotated[float, Field(ge=1.0, le=2.0)]
+
+    @property
+    def selection_operator(self) -> Selection:
+        """The selection that `selection` stands for."""
+        named: dict[Any, Any] = {
+            "tournament": Tournament(tournament_size=self.tournament_size),
+            "roulette": InverseRoulette(),
+            "rank": LinearRanking(rank_pressure=self.rank_pressure),
+        }
+        return cast(Selection, named.get(self.selection, self.selection))
+
+
+class RealGenetic(SelectiveSettings):
+    """Genomes of real numbers within limits."""
+
+    component: ClassVar[str] = "real_genetic"
+
+    # of a pair, with probability `crossover_rate`
+    crossover: Literal["one_point", "uniform", "arithmetic", "blx_alpha"] | Named[Crossover]
+    # α of BLX-α: how far beyond the parents children may lie, in units of their distance [-]
+    blend_alpha: NonNegative
+    mutation: Literal["non_uniform", "gaussian", "uniform_reset"] | Named[Mutation]
+    # whether `mutation_rate` is the probability of every `gene`, or of one gene of an
+    # `individual`
+    mutation_scope: Literal["gene", "individual"]
+    mutation_power: NonNegativeCount  # b of non-uniform mutation [-]
+    # standard deviation of Gaussian mutation, in units of a gene's range [-]
+    mutation_std: Positive
+
+    @property
+    def operators(self) -> Operators:
+        """The operators of a search."""
+        one_gene = self.mutation_scope == "individual"
+        named: dict[Any, Any] = {
+            "one_point": OnePoint(),
+            "uniform": UniformCrossover(),
+            "arithmetic": ArithmeticCrossover(),
+            "blx_alpha": BlxAlpha(blend_alpha=self.blend_alpha),
+            "non_uniform": NonUniformMutation(
+                one_gene=one_gene, mutation_power=self.mutation_power
+            ),
+            "gaussian": GaussianMutation(one_gene=one_gene, mutation_std=self.mutation_std),
+            "uniform_reset": UniformReset(one_gene=one_gene),
+        }
+        crossover, mutation = (named.get(own, own) for own in (self.crossover, self.mutation))
+        return Operators(self.selection_operator, crossover, mutation)
+
+
+class BinaryGenetic(SelectiveSettings):
+    """Genomes of bits: every gene a plain binary number.
+
+    One-point crossover between bits, mutation bit by bit.
+    """
+
+    component: ClassVar[str] = "binary_genetic"
+
+    # B; a gene takes 2^B values, its limits included [-]
+    bits_per_gene: Annotated[int, Field(ge=1, le=52)]
+
+    @property
+    def operators(self) -> Operators:
+        """The operators of a search."""
+        return Operators(self.selection_operator, OnePoint(), BitFlips())
+
+
+if TYPE_CHECKING:
+    from evoexp.planners.redundant_ga.planner import RedundantGa
 
 
 class BestEnd(NamedTuple):
@@ -106,7 +198,7 @@ class Search(GeneticSearch):
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
         uniforms = rng.random(self._num_genes * self._ga.population_size)
-        kernels.begin(uniforms, self._sub_path, self._tables, self.summaries)
+        kernels.begin(uniforms, self._sub_path, self._tables)
         self.states = [state_bytes(rng.bit_generator)]
         self._summarise(0)
 

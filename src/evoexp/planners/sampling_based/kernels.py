@@ -12,18 +12,11 @@ from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray, IntArray
 
-NODES = 64
-"""Nodes whose squared distances are computed together, as vectors."""
-
-LANES = 8
-"""Configurations that a collision model tests together."""
-
-SLACK = 1e-6
-"""[-] by which an edge may be longer than a whole number of tested parts, for rounding's sake."""
-
-
+NODES = 64  # whose squared distances are computed together, as vectors
+LANES = 8  # configurations that a collision model tests together
+SLACK = 1e-6  # [-] by which an edge may be longer than a whole number of tested parts: rounding
+# outcomes of a step toward a configuration (Kuffner & LaValle 2000, Fig. 2)
 TRAPPED, ADVANCED, REACHED = range(3)
-"""Outcomes of a step toward a configuration (Kuffner & LaValle 2000, Fig. 2)."""
 
 
 class Trees(NamedTuple):

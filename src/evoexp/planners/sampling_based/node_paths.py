@@ -14,7 +14,7 @@ from pydantic import Field
 from evoexp.collision.bodies.covered_bodies import CoveredBodies
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.succession import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import in_shape

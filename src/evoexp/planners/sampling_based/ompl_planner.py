@@ -160,10 +160,7 @@ class _Library:
         self._info.setStateValidityChecker(is_free)
 
         class Edges(base.MotionValidator):  # type: ignore[misc]
-            """Tests whole edges."""
-
             def checkMotion(self, one: Any, two: Any, last: Any = None) -> bool:  # noqa: N802
-                """Whether the edge between two states is free."""
                 ends = np.array([_array(one, nq), _array(two, nq)])
                 return edges.is_free(*ends) and edges.unproven(ends) is None
 
@@ -215,7 +212,6 @@ class _Roadmap(_Library):
     """
 
     def solve(self, most: int) -> FloatArray | None:
-        """Let the roadmap grow until so many configurations were asked for; see `_Library`."""
         if self._planner.milestoneCount() == 0:
             self._planner.solve(self._base.plannerAlwaysTerminatingCondition())
         self._planner.growRoadmapPtc(self._enough(most))

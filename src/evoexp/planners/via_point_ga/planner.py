@@ -10,33 +10,95 @@ arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start
 """
 
 from collections.abc import Iterator, Mapping
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from evoexp.collision.bodies.covered_bodies import CoveredCollision
+from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
+from evoexp.evolution.operators.breeding import GeneticSettings, Operators
+from evoexp.evolution.operators.selection import FitnessRoulette
 from evoexp.numeric.elementary import DEGREE
+from evoexp.objectives.string_fitness import StringFitness
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
 from evoexp.planners.planner import COPIES, JudgementArrays, num_values
-from evoexp.planners.proofs import Proofs
-from evoexp.planners.via_point_ga import kernels
-from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Problem, ProvenSearch, Search, Strings, settle
+from evoexp.planners.proofs import Acceptance, Proofs
+from evoexp.planners.via_point_ga.string_operators import NewTrajectories, StringCrossover
+from evoexp.planners.via_point_ga.strings import Problem, Search, Strings, settle, smooth
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.validation import Component
+from evoexp.validation import (
+    Component,
+    Count,
+    LayoutCount,
+    NonNegativeCount,
+    Positive,
+    Rate,
+)
 
+SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
-class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
-    """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4."""
+class ViaPointGa(ArmDefaults, Component):
+    """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4 (Tables 1 and 3)."""
 
     component: ClassVar[str] = "via_point_ga"
     is_real_coded: ClassVar[bool] = True
+
+    num_via_points: LayoutCount  # N; instants 1 … N are judged, 0 is the start, N the goal
+    walk_step: Positive  # step length of a new trajectory, in units of its straight distance over N
+    # largest random turn of a step away from the direction of the goal [deg]
+    max_turn: Annotated[float, Field(ge=0.0, le=180.0)]
+    num_new_trajectories: NonNegativeCount  # offspring replaced by new trajectories per generation
+    crossover_distance: Positive  # strings are crossed only where they are closer than this [deg]
+    relaxation_step: Rate  # delta of Eqs. 8, 9
+    # whether via-points are redistributed evenly along a spline (off: an ablation)
+    redistribution: bool
+    spline_end: Literal["natural", "clamped"]  # end condition of that spline
+    samples_per_segment: Count  # samples of its arc length between two via-points
+    ga: GeneticSettings  # population, generations, elites, rates
+    objective: StringFitness  # weights of Eq. 7
+    # the touching circles or spheres, or covers of the bodies
+    collision: TouchingSpheres | CoveredBodies
+    # how the double cross-over of section 3.4b is read: `tails` exchanges what follows the
+    # site in every arm's path; `segment` exchanges what lies between the two sites of the
+    # whole string: the end of the first path and the beginning of the second
+    crossover_reading: Literal["tails", "segment"] = "tails"
+    # which motions are an answer: those that the collision model accepts at the instants it
+    # tests (`model`), those of them that the exact certifier proves free of contact between
+    # all instants (`certified`), or also free by the task's margins (`margin`). A string that
+    # is refuted counts as colliding at one instant more
+    acceptance: Acceptance = "model"
+
+    @model_validator(mode="after")
+    def _samples_halve(self) -> Self:
+        must = f"one of {', '.join(map(str, SAMPLES))}"
+        self.demand("samples_per_segment", self.samples_per_segment in SAMPLES, must)
+        return self
+
+    @property
+    def operators(self) -> Operators:
+        """The paper's operators (section 3.4 a, b, d), where `ga` names no others."""
+        ga = self.ga
+        return Operators(
+            ga.selection or FitnessRoulette(fitness_offset=self.objective.fitness_offset),
+            ga.crossover
+            or StringCrossover(
+                crossover_distance=self.crossover_distance,
+                exchanges_segment=self.crossover_reading == "segment",
+            ),
+            ga.mutation
+            or NewTrajectories(
+                num_new_trajectories=self.num_new_trajectories,
+                walk_step=self.walk_step,
+                max_turn=self.max_turn,
+            ),
+        )
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision."""
@@ -47,8 +109,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
-        kind = ProvenSearch if self.answers_are_proven else Search
-        return kind(self, problem).blocks(rng)
+        return Search(self, problem).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
@@ -80,7 +141,7 @@ class ViaPointGa(ArmDefaults, ViaPointSettings, Component):
         """
         strings, count = Strings(self, problem), population.shape[2]
         improved = strings.padded(population)
-        kernels.smooth(improved, count, strings.settings)
+        smooth(improved, count, strings.settings)
         return improved[:, :, :count]
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.evolution.pareto import pareto_front
+from evoexp.evolution.succession import pareto_front
 from evoexp.records import FloatArray, FrontRow
 from evoexp.report.figures import groups, rounded, style
 from evoexp.report.pages.page_parts import Quantity

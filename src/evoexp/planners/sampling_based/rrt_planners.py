@@ -1,12 +1,9 @@
-"""RRT-Connect to places of a planar arm's tip: a posture is sought at each, then a path to it.
+"""RRT-Connect to a configuration, and to places of a planar arm's tip (Kuffner & LaValle 2000).
 
-For the via point and then for the goal point, postures whose tip is there are found from random
-ones by damped least squares; the nearest of the free ones is the goal of two trees.
-
-A solution is flat: posture by posture, joint by joint (postures × joints) [rad], the start
-included; the start alone: there is no motion. A generation is a batch of iterations: its costs are
-the lengths of the plans that they complete, inf elsewhere; its population is the shortest plan so
-far.
+Two trees grow toward each other; the first path that is free is made shorter by random shortcuts
+(Geraerts & Overmars 2007). The goal is never drawn on purpose. A generation is a batch of
+iterations; its costs are the lengths of the path or plan in hand after each, inf before there is
+one.
 """
 
 from collections.abc import Generator, Iterator
@@ -18,17 +15,116 @@ from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.answers import of_postures
+from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.planner import Candidate, JudgementArrays
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.sampling_based.kernels import distance
-from evoexp.planners.sampling_based.node_paths import InIterations, judge_paths, path_length
+from evoexp.planners.sampling_based.node_paths import (
+    InIterations,
+    NodePaths,
+    judge_paths,
+    path_length,
+)
 from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import bring_tip_to, tip
 from evoexp.scenarios.motion_tasks import PickAndPlace
 from evoexp.validation import Component, Count, NonNegativeCount, Positive
+
+
+class RrtConnect(InIterations, NodePaths, Component):
+    """RRT-Connect and shortcuts; the population is all nodes of both trees."""
+
+    component: ClassVar[str] = "rrt_connect"
+    revision: ClassVar[int] = 3
+
+    # how often both trees are grown anew once a path is shortened or given up; the shortest
+    # path of all is the answer
+    num_restarts: NonNegativeCount = 0
+
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield a record per batch of iterations, until the last path is shortened or given up."""
+        return self.batches(_ConnectSearch(self, problem), rng)
+
+    @property
+    def most_iterations(self) -> int:
+        """Iterations of a run that finds its paths last of all, shortcuts included."""
+        return (1 + self.num_restarts) * (self.max_iterations + self.num_improvements)
+
+
+class _ConnectSearch:
+    """The state of one run: the trees until they meet, then the path, and so at each start."""
+
+    def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
+        self._planner, self._ends = planner, (problem.start, problem.goal)
+        self._low, self._high = planner.box(problem)
+        self.edges = planner.edge_test(problem)
+        self.pair = TreePair(*self._ends, self.edges, planner.range)
+        self._path: ShortenedPath | None = None
+        self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
+        self._starts, self._iterations, self.best_cost = 1, 0, np.inf
+        self._solution = problem.start.copy()
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the run ends now; empty while it goes on."""
+        if not self._is_done() or self._starts <= self._planner.num_restarts:
+            return ""
+        return "solution" if np.isfinite(self.best_cost) else "no solution"
+
+    @property
+    def population(self) -> FloatArray:
+        """(nodes, nq) all nodes of both trees [deg]."""
+        return self.pair.nodes
+
+    def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
+        """Grow the trees, or try some shortcuts; return the length after each [deg], or inf."""
+        if self._is_done():
+            self._keep_shortest()
+            self.pair = TreePair(*self._ends, self.edges, self._planner.range)
+            self._path, self._starts = None, self._starts + 1
+        if self._path is not None:
+            return self._path.improve(self._planner.num_shortcuts, rng, most)
+        drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
+        self._iterations += 1
+        nodes = self.pair.iterate(drawn)
+        if nodes is None:
+            return np.array([np.inf])
+        self._path = ShortenedPath(nodes, self.edges)
+        if not np.isfinite(self._first["first_solution_queries"]):
+            self._first = {
+                "first_solution_queries": float(self.edges.queries),
+                "first_solution_length_deg": self._path.length,
+            }
+        return self._path.lengths[-1:]
+
+    def candidate(self) -> Candidate:
+        """Return the shortest path as it is recorded, the same array as long as it is the same."""
+        self._keep_shortest()
+        terms = {
+            "length_deg": self.best_cost,
+            "iterations": float(self._iterations),
+            "nodes": float(len(self.pair.nodes)),
+        }
+        terms |= self._first | self.edges.certificates()
+        return Candidate(self._solution, terms, bool(np.isfinite(self.best_cost)))
+
+    def _keep_shortest(self) -> None:
+        """Keep the path in hand if it is the shortest so far, and proven where asked for."""
+        path = self._path
+        if path is not None and path.length < self.best_cost:
+            path.settle()
+            if path.length < self.best_cost:
+                self.best_cost, self._solution = path.length, path.nodes.flatten()
+
+    def _is_done(self) -> bool:
+        """Whether the present start has come to its end."""
+        if self._path is not None:
+            return self._path.num_attempts >= self._planner.num_improvements
+        return self.pair.num_iterations >= self._planner.max_iterations
+
 
 CLOSE = 1e-6  # [-] of the arm's length, by which the tip may miss a place
 PLACES = "via point", "goal point"
@@ -37,7 +133,11 @@ PLACES = "via point", "goal point"
 class RrtReaching(InIterations, Component):
     """RRT-Connect to postures that reach the via point, and then to some that reach the goal.
 
-    Distances are Euclidean over all joints, in degrees.
+    Postures whose tip is at either point are found from random ones by damped least squares; the
+    nearest of the free ones is the goal of two trees. Distances are Euclidean over all joints, in
+    degrees. A solution is flat: posture by posture, joint by joint (postures × joints) [rad], the
+    start included; the start alone: there is no motion. The population is the shortest plan so far;
+    iterations that complete no plan cost inf.
     """
 
     component: ClassVar[str] = "rrt_reaching"
@@ -68,7 +168,7 @@ class RrtReaching(InIterations, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last plan is complete or given up."""
-        return self.batches(_Search(self, problem), rng)
+        return self.batches(_ReachingSearch(self, problem), rng)
 
     @property
     def most_iterations(self) -> int:
@@ -107,7 +207,7 @@ class RrtReaching(InIterations, Component):
         return float(via.min()), float(goal[-1])
 
 
-class _Search:
+class _ReachingSearch:
     """The state of one run; its population is the shortest plan (postures, joints) [rad]."""
 
     def __init__(self, planner: RrtReaching, problem: Problem) -> None:
@@ -127,7 +227,6 @@ class _Search:
         return np.array([] if length is None else [length])
 
     def candidate(self) -> Candidate:
-        """Return the shortest plan as it is recorded."""
         terms = {
             "length_deg": self.best_cost,
             "iterations": float(self._iterations),

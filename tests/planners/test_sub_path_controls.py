@@ -1,4 +1,4 @@
-"""The damped pseudoinverse in the loop of Lavoie & Boudreau 2001, by plain steps in numpy."""
+"""Draws, and the damped pseudoinverse, in the loop of Lavoie & Boudreau 2001: by plain steps."""
 
 from typing import Any
 
@@ -93,3 +93,42 @@ def test_bits_and_another_planner_are_refused_in_one_line() -> None:
     must = "planner: must be redundant_ga, whose sub-paths inverse_kinematics draws, was [^\n]*$"
     with pytest.raises(SettingError, match=must):
         composed("experiment=chen_path", "control=inverse_kinematics")
+
+
+def drawn(*overrides: str, experiment: str = "lavoie_7dof") -> Condition:
+    small = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")
+    return composed(f"experiment={experiment}", "control=sequential_search", *small, *overrides)
+
+
+@pytest.mark.parametrize("stretch", [1, 3, 8])
+@pytest.mark.parametrize(
+    ("words", "solved"),
+    [
+        ("planner.stop_cost_sp1=16 planner.stop_cost_sp2=12", True),
+        ("planner.stop_cost_sp1=9 planner.stop_cost_sp2=3", False),
+        ("ga=lavoie_binary planner.stop_cost_sp1=16 ga.num_elites=3", False),
+    ],
+)
+def test_it_draws_what_a_plain_loop_draws(
+    words: str, solved: bool, stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many populations are drawn per call."""
+    monkeypatch.setattr("evoexp.planners.redundant_ga.sub_path.STRETCH", stretch)
+    given = drawn(*words.split())
+    own: Any = given.planner
+    records = ran(given, 1).records
+    slow = given._replace(planner=own.planner)
+    expected = list(lavoie_numpy.evolve(slow, np.random.default_rng(1), evolves=False))
+    last = records[-1]
+    assert last.solved == solved
+    assert last.terms["attempts"] == expected[-1].attempt
+    assert last.evaluations == sum(len(each.costs) for each in expected)
+    assert last.best_cost == pytest.approx(expected[-1].best_cost, abs=1e-9)
+    lowest = [record.costs.min() for record in records]
+    np.testing.assert_allclose(lowest, [each.costs.min() for each in expected], atol=1e-9)
+
+
+def test_without_offspring_nothing_is_drawn_after_the_first_population() -> None:
+    records = ran(drawn("ga.num_elites=60")).records
+    searches = {(record.terms["attempts"], record.terms["sub_path"]) for record in records}
+    assert records[-1].evaluations == 60 * len(searches)

@@ -23,10 +23,7 @@ PRINTED = "as printed"  # label of the printed setting among the ablations
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
 COST = "best cost"
 BEST = comparisons.by_column("best_cost")
-COMPARED = (
-    Measure(COST, BEST),
-    Measure(EVENNESS, measures.unevenness, "deg"),
-)
+COMPARED = Measure(COST, BEST), Measure(EVENNESS, measures.unevenness, "deg")
 Controls = Sequence[ConditionResults]
 
 
@@ -73,9 +70,7 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
     if printed is None:
         return []
     others = [other for other in named.values() if other is not printed]
-    found = comparisons.compare_families(
-        [Family.of([printed, *others])], COMPARED[:2], judge.settings
-    )
+    found = comparisons.compare_families([Family.of([printed, *others])], COMPARED, judge.settings)
     rows = {one.measure.name: {row.quantity: row for row in one.rows} for one in found}
     parts = [other for other in others if other.label in PARTS]
     counts = {c.label: measures.refuted(c) for c in (printed, *parts)}
@@ -196,7 +191,4 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # a colliding instant costs so many straight paths of all arms together
     "share_of_path": lambda worth, straight_length: worth / straight_length,
     "percent_of_path": lambda share_of_path: 100.0 * share_of_path,
-    "median_longer": lambda condition: float(
-        np.median(measures.length(condition)) - measures.straight_length(condition)
-    ),
 }

@@ -1,16 +1,20 @@
-"""The five criteria of Chen & Zalzala 1995, section 4.2: conditions, printed postures, rows."""
+"""Docking postures of Chen & Zalzala 1995, section 4.2: five criteria, rows, claims on them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from evoexp.planners.placement_ga.planner import NAMES, Problem
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.results.run_measures import counted, grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.inference import Interval, Proportion, spread
+from evoexp.report.statistics.inference import Interval, Proportion, fisher_exact, spread
+from evoexp.report.statistics.judging import Judge
 
 METHODS = {
     "Newton-type": "newton",
@@ -19,42 +23,31 @@ METHODS = {
 }  # conventional methods: names on the page → names in the records of the reference
 AROUND, STEP = 10.0, 0.05  # [deg] from the optimum, where near postures are looked for
 CLOSE = (0.001, 0.01)  # [-] gaps to the optimum; shares of runs within them are given
+MINIMAX, MANIPULABILITY = "minimax torque", "manipulability and torque"
 
 
 class PrintedPosture(NamedTuple):
     """The numbers that the paper prints of the best posture by one criterion."""
 
-    figure: str  # the paper's figure
-    term: str  # name of the printed number, as the planner's `evaluate` names it
-    value: float  # the number; NaN if only angles are printed
-    angles: tuple[float, float] | None = None  # θ1, θ2 [deg]; None if they are not printed
-    torques: tuple[float, float, float] | None = None  # τ1, τ2, τ3; None if they are not printed
+    figure: str = ""  # the paper's figure
+    term: str = ""  # name of the printed number, as the planner's `evaluate` names it
+    value: float = np.nan  # the number; NaN if only angles are printed
+    angles: Sequence[float] | None = None  # θ1, θ2 [deg]; None if they are not printed
+    torques: Sequence[float] | None = None  # τ1, τ2, τ3; None if they are not printed
     ratio: float = np.nan  # greatest over least torque, by size; NaN if it is not printed
-
-
-PRINTED = {
-    "least torque norm": PrintedPosture(
-        "Fig. 4", "torque_norm", 1.73, torques=(-0.61, 1.13, -0.3), ratio=3.73
-    ),
-    "minimax torque": PrintedPosture(
-        "Fig. 5", "torque_max", 0.90, (68.96, 41.74), torques=(-0.90, 0.90, -0.87)
-    ),
-    "obstacle and link 2": PrintedPosture("Fig. 6", "torque_norm", 2.08),
-    "obstacle and platform": PrintedPosture("Fig. 7", "torque_norm", 3.01),
-    "manipulability and torque": PrintedPosture("Fig. 8", "cost", np.nan, (114.24, -36.93)),
-}
 
 
 class Case(NamedTuple):
     """The conditions of one criterion; None where a condition is absent or has no data."""
 
-    name: str  # the criterion, a key of PRINTED; else the label of the first condition
+    name: str  # the criterion; of another one the label of the first condition
     plain: ConditionResults | None = None  # the genetic algorithm without elitism
     elitist: ConditionResults | None = None  # the genetic algorithm with elitism
     search: ConditionResults | None = None  # random search at equal evaluations
     optimum: ConditionResults | None = None  # the exact optimum
     conventional: ConditionResults | None = None  # local methods from many starts
     landscape: ConditionResults | None = None  # E over θ1 and θ2
+    printed: PrintedPosture = PrintedPosture()  # the numbers that the paper prints
 
     @property
     def conditions(self) -> tuple[ConditionResults, ...]:
@@ -66,11 +59,6 @@ class Case(NamedTuple):
         """The conditions that were run with many seeds, by their names in figures."""
         named = {"GA": self.plain, "GA, elitism": self.elitist, "random search": self.search}
         return {name: c for name, c in named.items() if c is not None}
-
-    @property
-    def printed(self) -> PrintedPosture:
-        """The numbers that the paper prints: no value and no angles where it prints none."""
-        return PRINTED.get(self.name, PrintedPosture("", "", np.nan))
 
     @property
     def least(self) -> float:
@@ -128,14 +116,14 @@ class Case(NamedTuple):
         }
 
 
-def cases(results: Results) -> list[Case]:
+def cases(results: Results, printed_postures: Mapping[str, Any]) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
     names: dict[Any, str] = {  # weights of the terms, links that avoid obstacles → name
         (True, False, False): "least torque norm",
-        (False, True, False): "minimax torque",
+        (False, True, False): MINIMAX,
         (True, False, False, 2): "obstacle and link 2",
         (True, False, False, 0): "obstacle and platform",
-        (True, False, True): "manipulability and torque",
+        (True, False, True): MANIPULABILITY,
     }
     found = []
     for own in grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective)):
@@ -148,7 +136,9 @@ def cases(results: Results) -> list[Case]:
         cost = own[0].planner.objective
         weights = cost.torque_norm_weight, cost.torque_max_weight, cost.manipulability_weight
         criterion = (*map(bool, weights), *(one.link for one in cost.avoidances))
-        found.append(Case(names.get(criterion, own[0].label), **roles))
+        name = names.get(criterion, own[0].label)
+        printed = PrintedPosture(**printed_postures.get(name, {}))
+        found.append(Case(name, **roles, printed=printed))
     return found
 
 
@@ -229,10 +219,162 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
     return rows
 
 
+def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
+    """Judge the number, the angles, the torques and their ratio, as far as they are printed."""
+    printed = case.printed
+    angles = _signed("({:g}, {:g})°".format(*printed.angles)) if printed.angles else ""
+    on = partial(judge.on, case=case.name, figure=printed.figure, angles=angles)
+    if not np.isnan(printed.value):
+        yield judge_value(judge, case)
+    if printed.angles is not None:
+        cost = case.measured(printed.angles)["cost"]
+        gap = 100.0 * float(case.gaps(np.array([cost]))[0])
+        hearing = on("printed_angles")
+        told: dict[str, object] = {"cost": cost, "least": case.least, "gap": gap}
+        yield hearing.own(told, 1, gap <= hearing.rule.limits["near_percent"])
+    if printed.torques is None:
+        return
+    # the torques of the exact optimum, of its mirror images the nearest
+    torques = np.array(printed.torques)
+    optima = case.minima[case.minima[:, 2] <= case.least * (1.0 + 1e-9), :2]
+    exact = min(map(case.torques, optima), key=lambda own: float(np.abs(own - torques).max()))
+    by_norm = case.conditions[0].planner.objective.torque_norm_weight > 0.0
+    cost = float((torques**2).sum() if by_norm else np.abs(torques).max())
+    gap, off = 100.0 * (cost / case.least - 1.0), float(np.abs(exact - torques).max())
+    hearing = on("printed_torques", torques=triple(torques, 2))
+    limits = hearing.rule.limits
+    told = {"exact": triple(exact, 4), "off": off, "cost": cost, "gap": gap, "least": case.least}
+    yield hearing.own(told, 1, gap <= limits["near_percent"] and off <= limits["rounded"])
+    # those of our model at the printed angles
+    if printed.angles is not None:
+        own = case.torques(printed.angles)
+        off = float(np.abs(own - torques).max())
+        hearing = on("torques_at_angles", torques=triple(torques, 2))
+        told = {"own": triple(own, 4), "off": off}
+        yield hearing.own(told, 1, off <= hearing.rule.limits["rounded"])
+    if not np.isnan(printed.ratio):
+        yield _ratio(judge, case, np.abs(torques), np.abs(exact))
+
+
+def judge_value(judge: Judge, case: Case) -> Claim:
+    """Judge the printed number by that of the exact optimum, and of postures near it."""
+    printed, exact = case.printed, case.measured(case.optimal_angles)
+    best, name = exact[printed.term], printed.term.replace("_", " ")
+    words = {"case": case.name, "term": name, "value": f"{printed.value:g}"}
+    hearing = judge.on("printed_value", figure=printed.figure, **words)
+    told = f"at the exact optimum {markdown.number(best)}"
+    if case.conditions[0].planner.objective.avoidances:
+        told += (
+            f" (E = {markdown.number(case.least)}, of which the obstacle "
+            f"{markdown.number(exact['obstacle'])})"
+        )
+    rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
+    low, high = case.near_values(printed.term, 0.01 * near)
+    told += f"; within {near:g} % of it {markdown.number(low)} to {markdown.number(high)}"
+    agrees: bool | None = low - rounded <= printed.value <= high + rounded
+    if case.name == "obstacle and platform":
+        told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
+        agrees = agrees or None
+    return hearing.own(told, 1, agrees)
+
+
+def _ratio(judge: Judge, case: Case, sizes: FloatArray, exact: FloatArray) -> Claim:
+    """Judge the printed ratio of torques by the printed sizes, and by those of the optimum."""
+    printed = case.printed
+    words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
+    hearing = judge.on("torque_ratio", **words)
+    rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
+    lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
+    greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
+    own = float(exact.max() / exact.min())
+    off = 100.0 * (own / printed.ratio - 1.0)
+    told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
+    holds = bool(lowest <= printed.ratio <= greatest and abs(off) <= near)
+    return hearing.own(told | {"own": own, "off": off}, 1, holds)
+
+
+def triple(torques: FloatArray, digits: int) -> str:
+    """Return torques in words: (−0.61, 1.13, −0.30)."""
+    return _signed(f"({', '.join(f'{torque:.{digits}f}' for torque in torques)})")
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", "−")
+
+
+def against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
+    """Judge that conventional methods get stuck, and that the genetic algorithm does better."""
+    for method, ends in case.ends().items():
+        hearing = judge.on("gets_stuck", case=case.name, method=method)
+        at_best = case.within(ends[:, 2], hearing.rule.limits["near_percent"] / 100.0)
+        stuck = Proportion(at_best.total - at_best.having, at_best.total)
+        interval = markdown.percent(stuck.interval(judge.level))
+        told: dict[str, object] = {"stuck": stuck, "interval": interval}
+        yield hearing.own(told, stuck.total, stuck.having > 0)
+        if case.elitist is None or case.conventional is None:
+            continue
+        # a run of the genetic algorithm against one start of the method, and their efforts
+        efforts = judge.on("per_success", case=case.name, method=method)
+        close = efforts.rule.limits["near_percent"]
+        own = case.within(case.elitist.column("best_cost"), close / 100.0)
+        of_start = float(case.conventional.column(f"term_{METHODS[method]}_evaluations")[0])
+        of_run = float(case.elitist.column("evaluations").mean())
+        told = {"close": close, "runs": 100 * own.share, "starts": 100 * at_best.share}
+        told |= {"p": fisher_exact(own, at_best), "of_run": of_run, "of_start": of_start}
+        runs = judge.on("better_than_a_start", case=case.name, method=method)
+        yield runs.greater(told, own, at_best)
+        run, start = (
+            effort / share if share else np.inf
+            for effort, share in ((of_run, own.share), (of_start, at_best.share))
+        )
+        ratio, between = run / start, Interval(0.0, np.inf)
+        if own.having and at_best.having:
+            # runs cost about the same each, and starts: the ratio varies as that of the shares
+            shares = stats.contingency.relative_risk(*at_best, *own)
+            by_shares, price = shares.confidence_interval(judge.level), of_run / of_start
+            between = Interval(price * by_shares.low, price * by_shares.high)
+        low, high = between
+        text = f"{run:.0f} against {start:.0f}; ratio {ratio:.3g} [{low:.3g}, {high:.3g}]"
+        holds = None if low <= 1.0 <= high else high < 1.0
+        size = EffectSize("ratio of efforts per success", ratio, low, high, 1.0)
+        counted = f"{own.total} and {at_best.total}"
+        yield efforts.own(text.replace("inf", "∞"), counted, holds, size)
+
+
+def evener_torques(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
+    """Judge that the minimax criterion loads the joints more evenly than the least norm."""
+    ratios = {}
+    for case in exact_cases:
+        sizes = np.abs(case.torques(case.optimal_angles))
+        ratios[case.name] = float(sizes.max() / sizes.min())
+    if {"least torque norm", "minimax torque"} <= ratios.keys():
+        told = {"norm": ratios["least torque norm"], "minimax": ratios["minimax torque"]}
+        yield judge.on("evener_torques").own(told, 2, told["minimax"] < told["norm"])
+
+
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # criteria whose exact optimum is known, those of them that were evolved, those with a landscape
     "exact_cases": lambda cases: [case for case in cases if case.optimum is not None],
     "evolved_cases": lambda exact_cases: [case for case in exact_cases if case.evolved],
     "landscapes": lambda cases: [case for case in cases if case.landscape is not None],
     "case_conditions": lambda cases: tuple(c for case in cases for c in case.conditions),
+    "near_optimum": lambda condition, case, rules: case.within(
+        condition.column("best_cost"), rules["near_posture"].limits["near_percent"] / 100.0
+    ),
+    # (criterion, how it was evolved, its runs) of those that random search stands beside
+    "evolved_beside_search": lambda exact_cases: [
+        (case, elitism, run)
+        for case in exact_cases
+        for elitism, run in (("without elitism", case.plain), ("with elitism", case.elitist))
+        if run is not None and case.search is not None
+    ],
+    "is_manipulability": lambda case: case.name == MANIPULABILITY,
+    "plain_minimax": lambda case: case.name == MINIMAX and case.plain,
+    "plain_manipulability": lambda case: case.name == MANIPULABILITY and case.plain,
+    # median time of a run, its exact verdict included
+    "milliseconds": lambda condition: 1e3 * float(np.median(condition.column("cpu_s"))),
+    "in_seconds": lambda milliseconds, rules: (
+        milliseconds <= 1e3 * rules["seconds"].limits["most_s"]
+    ),
+    "num_minima": lambda case: float(len(case.minima)),
 }

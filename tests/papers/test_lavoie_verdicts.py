@@ -10,7 +10,7 @@ import pytest
 import report_samples
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.papers.lavoie import claims, measures
+from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Claim
@@ -69,7 +69,7 @@ def changed(condition: ConditionResults, **columns: object) -> ConditionResults:
 
 
 def percentages(results: Results) -> list[Claim]:
-    return list(claims.percentages(Judge("", SETTINGS, RULES), results.conditions))
+    return list(measures.percentages(Judge("", SETTINGS, RULES), results.conditions))
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_runs_need_no_start_if_they_fail_no_more_often_than_the_papers(
     errors[:failures] = np.nan
     results = two_arms(errors, errors)
     (own,) = (c for c in results.conditions if c.label == label)
-    found = claims.no_start_needed(judge(results, SETTINGS, RULES), own)
+    found = measures.no_start_needed(judge(results, SETTINGS, RULES), own)
     assert found is not None and found.verdict == verdict
     assert f"{1000 - failures} of 1000" in found.evidence
     assert "lies above −1 point; contradicted if it lies below −1 point" in found.rule
@@ -229,12 +229,12 @@ def test_the_best_control_solves_most_and_then_costs_least() -> None:
     errors = {label: np.full(20, np.nan) for label in labels_of("lavoie_controls")}
     controls = [c for c in made_up(errors, "lavoie_controls").conditions if c.is_control]
     drawn, pairs, _ = (c for c in controls if c.label.startswith("7-DOF"))
-    assert claims.best_control([pairs, drawn]) is pairs, "the first where none is better"
+    assert measures.best_control([pairs, drawn]) is pairs, "the first where none is better"
     one = changed(drawn, solved=[True] + [False] * 19)
-    assert claims.best_control([pairs, one]) is one
+    assert measures.best_control([pairs, one]) is one
     cheap = changed(one, evaluations=10)
-    assert claims.best_control([one, cheap]) is cheap
-    assert claims.solved_within(one, one).having == 1, "runs without a solution count not"
+    assert measures.best_control([one, cheap]) is cheap
+    assert measures.solved_within(one, one).having == 1, "runs without a solution count not"
 
 
 def test_positions_and_chords_are_judged_with_adjusted_p_values() -> None:

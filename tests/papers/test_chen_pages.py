@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.papers.chen import docking, path_claims
-from evoexp.papers.chen.docking import Case
+from evoexp.papers.chen import docking_postures, path_claims
+from evoexp.papers.chen.docking_postures import Case
 from evoexp.papers.chen.figures import placements
 from evoexp.papers.chen.figures.printed_fields import MISSING, SURPLUS, WRONG, compare
 from evoexp.papers.chen.path_claims import inside_points, routes, signature
@@ -68,7 +68,7 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
 
 @pytest.fixture(scope="module")
 def cases(outputs: Path) -> list[Case]:
-    return docking.cases(smoke_results(outputs, "chen_placement"), PRINTED)
+    return docking_postures.cases(smoke_results(outputs, "chen_placement"), PRINTED)
 
 
 def test_conditions_are_told_apart(cases: list[Case]) -> None:

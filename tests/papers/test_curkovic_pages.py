@@ -10,8 +10,7 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.papers.curkovic import compared_settings, measures
 from evoexp.papers.curkovic.figures import (
-    motion_curves,
-    pareto_fronts,
+    methods,
     robot_motions,
 )
 from evoexp.report.pages.page_builder import page_of
@@ -43,14 +42,14 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
     table = drawing(page(outputs, "curkovic_pareto"), "fig_5_fronts")
     assert len(table) == 2 * 100
     for _, rows in table.groupby("population"):
-        values = rows[list(pareto_fronts.CRITERIA)].to_numpy()
+        values = rows[list(methods.CRITERIA)].to_numpy()
         no_worse, better = values[:, None] <= values, values[:, None] < values
         dominated = (no_worse.all(axis=2) & better.any(axis=2)).any(axis=0)
         assert list(~dominated) == list(rows["non_dominated"])
 
 
 def test_the_intersection_lies_on_both_vectors(motion: ConditionResults) -> None:
-    table = motion_curves.intersection_table(motion).set_index("element")
+    table = robot_motions.intersection_table(motion).set_index("element")
     start, end = table[["x", "y"]].astype(float), table[["x_end", "y_end"]].to_numpy(float)
     ends = pd.DataFrame(end, table.index, ["x", "y"])
     for vector, name in (("b", "mu"), ("d", "nu")):
@@ -98,7 +97,7 @@ def test_other_scenes_are_drawn_and_claimed(
     series = dict(list(distances.groupby("series")))
     lowest, best, highest = (
         series[each].set_index("position")["distance"]
-        for each in (motion_curves.LOWEST, motion_curves.BEST, motion_curves.HIGHEST)
+        for each in (robot_motions.LOWEST, robot_motions.BEST, robot_motions.HIGHEST)
     )
     assert (lowest <= best).all() and (best <= highest).all()
     for position, condition in enumerate(smoke_results(outputs, name).conditions):
@@ -230,7 +229,7 @@ def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
     refuted, leaves, fast = measures.defects(condition)
     assert refuted == (condition.verdicts.solved_refuted, condition.solved)
     links = [
-        measures.sampled(measures.executed(condition.prepared, solution), 500).links
+        measures.sampled(condition.prepared, solution, 500).links
         for solution in condition.solutions.values()
     ]
     assert leaves.having == sum(q.min() < -1e-6 or q.max() > 180.0 + 1e-6 for q in links)

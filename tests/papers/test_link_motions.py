@@ -36,7 +36,7 @@ def solution(one: Prepared) -> FloatArray:
 
 @pytest.mark.examples(1)
 def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: FloatArray) -> None:
-    found = measures.sampled(measures.executed(one, solution), 10)
+    found = measures.sampled(one, solution, 10)
     assert found.links.shape == found.speeds.shape == (51, 2, 2)
     configurations = solution.reshape(2, 6, 2)
     np.testing.assert_allclose(found.links[::10].transpose(1, 0, 2), configurations, atol=1e-9)
@@ -46,7 +46,7 @@ def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: F
 
 @pytest.mark.examples(1)
 def test_speeds_are_differences_of_angles(one: Prepared, solution: FloatArray) -> None:
-    found = measures.sampled(measures.executed(one, solution), 2000)
+    found = measures.sampled(one, solution, 2000)
     off = np.abs(np.diff(found.links, axis=0) * 2000 - found.speeds[:-1]).max()
     # a step of 1/2000 against accelerations of some speeds per instant
     assert off < 0.002 * np.abs(found.speeds).max()

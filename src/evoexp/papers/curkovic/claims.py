@@ -16,8 +16,6 @@ from evoexp.report.statistics.judging import Judge
 
 Rows = tuple[Comparison, ...]
 Conditions = Sequence[ConditionResults]
-PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))  # with a hall, and without
-TWINS = dict(PAIRS)
 METHOD, ELITES = "V", "15 elites"
 KEPT = "least distance of an end-effector from another robot's links"
 
@@ -64,30 +62,22 @@ def enveloped(condition: ConditionResults) -> bool:
     return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
 
 
-def crossing(main: Conditions) -> Conditions:
-    """Return the first condition if it is one of two moving robots of lines; empty otherwise."""
-    first = main[0]
-    problem = first.problem(Problem)
-    plain = len(problem.start) == 2 and not enveloped(first) and problem.moving.all()
-    return (first,) if plain else ()
+def kinds(condition: ConditionResults, radius_conditions: Conditions) -> dict[str, bool]:
+    """Tell what a scene is: `many` robots, one `still`, two of `thick` bodies or `crossing` lines.
 
-
-def motion_words(condition: ConditionResults, radius_conditions: Conditions) -> dict[str, str]:
-    """Return stems and titles of the figures of a motion, and the beginning of that of angles."""
+    Figs. 8 and 9 (`fig_8`) show two robots of one radius; `other` are motions of no figure.
+    """
     problem = condition.problem(Problem)
-    robots = len(problem.start)
-    angles = {"joints_stem": "joints", "joints": "Link"}
-    if not problem.moving.all():
-        return {"stem": "fig_10_motion", "title": "Fig. 10: one robot stands still"} | angles
-    if robots > 2 or radius_conditions:
-        return {"stem": "motion", "title": f"Motion of {robots} robots"} | angles
-    angles = {"joints_stem": "fig_9_joints", "joints": "Fig. 9: link"}
-    return {"stem": "fig_8_motion", "title": "Fig. 8: motion of the two robots"} | angles
+    many, all_move = len(problem.start) > 2, bool(problem.moving.all())
+    two, thick = all_move and not many, enveloped(condition)
+    found = {"many": many, "still": not (many or all_move), "fig_8": two and not radius_conditions}
+    found |= {"thick": two and thick, "crossing": two and not thick}
+    return found | {"other": not (found["still"] or found["fig_8"])}
 
 
-def with_hall(results: Results) -> Results:
+def with_hall(results: Results, pairs: Sequence[tuple[str, str]]) -> Results:
     """Return the results of the methods with a hall, under all numbers."""
-    treated = (c for c in results.conditions if _method(c) in TWINS)
+    treated = (c for c in results.conditions if _method(c) in dict(pairs))
     return results._replace(conditions=tuple(treated))
 
 
@@ -113,23 +103,8 @@ def larger_radius(judge: Judge, compared_radii: Rows) -> Iterator[Claim]:
         yield judge.on("larger_radius", pair=row.quantity).better(row, "larger")
 
 
-def other_scene(condition: ConditionResults) -> tuple[str, str]:
-    """Return the words of the claim on a scene, and its source; empty of robots that cross."""
-    problem = condition.problem(Problem)
-    if len(problem.start) > 2:
-        return "The method takes new robots: it finds a collision-free motion of three", "section 5"
-    if not problem.moving.all():
-        text = "One robot stands still, obstacles stand around: a collision-free motion"
-        return text, "section 4, Fig. 10"
-    if enveloped(condition):
-        text = "Envelopes and circles: a collision-free motion of the robots with their bodies"
-        return text, "section 4"
-    return "", ""
-
-
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
-    "pairs": lambda: PAIRS,
-    "has_hall": lambda condition: condition.label in TWINS,
+    "firsts": lambda main: main[:1],
     # bodies that stick out of boundary lines, and the length of the chromosome
     "is_enveloped": lambda first: enveloped(first),
     "sticking_out": lambda conditions: (
@@ -142,7 +117,6 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "chromosome_notes": lambda first: first.planner.notes(first.prepared.problem),
     "instants": lambda: measures.INSTANTS,
-    "crosses": lambda other_scene: not other_scene[0],
     # motions that are free, of those that the exact verdict decides
     "free_by_exact_verdict": lambda condition: Proportion(
         run_measures.certified(condition).having, condition.done - condition.verdicts.undecided
@@ -159,7 +133,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "planned_of_all": lambda results: sum(c.planned for c in results.conditions),
     # under other numbers: the method, that without a hall, and the labels of both twins
     "treatment": _method,
-    "plain": lambda treatment: TWINS[treatment],
+    "plain": lambda treatment, pairs: dict(pairs)[treatment],
     "is_printed_method": lambda treatment: treatment == METHOD,
     "plain_twin": lambda results, condition, plain: _twin(results, condition, plain),
     "elites_twin": lambda results, condition: _twin(results, condition, ELITES),

@@ -20,7 +20,6 @@ from evoexp.report.statistics.comparisons import Comparison, Family, FamilyCompa
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles
 from evoexp.report.statistics.judging import Judge
 
-# says nothing about convergence
 COLLIDES = "solved motion collides between its configurations (exact verdict)"
 Statistic = Callable[[ConditionResults, np.ndarray], FloatArray]
 
@@ -69,14 +68,9 @@ def _without_substeps(condition: ConditionResults) -> str:
     return repr(planner | {"collision": planner["collision"] | {"collision_substeps": None}})
 
 
-def _converging(found: Sequence[FamilyComparison]) -> list[FamilyComparison]:
-    """Return the comparisons in quantities that say how fast or how far a method converges."""
-    return [one for one in found if one.measure.name != COLLIDES]
-
-
 def converging_rows(compared: Sequence[FamilyComparison]) -> dict[str, tuple[Comparison, ...]]:
     """Return the comparisons in how fast or how far a method converges, by quantity."""
-    return comparisons.rows_by_name(_converging(compared))
+    return comparisons.rows_by_name([one for one in compared if one.measure.name != COLLIDES])
 
 
 class Corner(NamedTuple):

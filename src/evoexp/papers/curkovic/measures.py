@@ -252,8 +252,9 @@ def executed(prepared: Prepared, solution: FloatArray) -> Motion:
     return cubic_motion(polynomials)
 
 
-def sampled(motion: Motion, samples: int) -> SampledMotion:
-    """Sample a motion in absolute link angles."""
+def sampled(prepared: Prepared, solution: FloatArray, samples: int) -> SampledMotion:
+    """Sample the motion that a solution executes, so often per segment."""
+    motion = executed(prepared, solution)
     segments = motion.num_segments
     instants = np.arange(segments * samples + 1) / samples
     before = np.minimum(instants.astype(np.int64), segments - 1)
@@ -284,8 +285,8 @@ def tool_distance(condition: ConditionResults) -> FloatArray:
     """
     found, assembly = [], condition.prepared.problem.assembly
     for k in condition.summaries.index:
-        motion = executed(condition.prepared, condition.solutions[int(k)])
-        places = motion_geometry.joint_positions(assembly, sampled(motion, TOOL_SAMPLES).q)
+        motion = sampled(condition.prepared, condition.solutions[int(k)], TOOL_SAMPLES)
+        places = motion_geometry.joint_positions(assembly, motion.q)
         links = [(robot, start, end) for robot, link, start, end in places if link < 2]
         tips = {robot: end for robot, _, end in links}
         distances = (

@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.papers import trails
-from evoexp.papers.chen.docking import CLOSE, METHODS, Case
+from evoexp.papers.chen.docking_postures import CLOSE, METHODS, Case
 from evoexp.papers.chen.figures import grid_paths
 from evoexp.planners.two_stage.planner import Problem
 from evoexp.report.figures import groups, marks, records, rounded, style

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
 from evoexp.papers.rana import measures
-from evoexp.papers.rana.figures.models import links_table, path_table
+from evoexp.papers.rana.figures.arm_models import links_table, path_table
 from evoexp.papers.rana.measures import STRAIGHT, TO_OBSTACLES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray

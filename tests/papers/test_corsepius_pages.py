@@ -15,7 +15,7 @@ from evoexp.papers.corsepius.figures import (
     posture_motions,
     solids,
 )
-from evoexp.papers.corsepius.figures.posture_motions import ShownPath
+from evoexp.papers.corsepius.measures import ShownPath
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import Results, gather

@@ -17,10 +17,10 @@ from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Interval, quantile
 from evoexp.report.statistics.judging import Judge
 
-TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 RECOMMENDED = 100.0  # individuals (section 5)
 REASONABLE = {RECOMMENDED: ("reasonable", "section 5"), 50.0: ("typical", "section 4.2")}
+SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # what else a smaller population changes
 KEPT, SCALED = "all else equal", "parents in proportion, patience in evaluations"
 # (task, size, its condition, that of the recommended size)
@@ -242,6 +242,26 @@ def _reasonable(judge: Judge, size: float, metric: str, found: Tasks, values: Va
     return hearing.own(told, f"{len(factors)} tasks", _unless(against, factors))
 
 
+def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...]]:
+    """Yield success and expected running times with their intervals, a row per task and size."""
+    level = settings.confidence
+    for task in sizes:
+        for value, c in task.by_value.items():
+            shares = (
+                count(c).with_interval(level) for count in (run_measures.success, measures.refuted)
+            )
+            efforts = []  # expected running times with their intervals
+            for metric, scale in SCALES.items() if c.solved else ():
+                runs = METRICS[metric](c), run_measures.solved(c)
+                interval = inference.expected_interval(*runs, level, settings.num_resamples)
+                expected, low, high = (
+                    markdown.number(float(f"{scale * value:.3g}"))
+                    for value in (inference.expected_effort(*runs), *interval)
+                )
+                efforts.append(f"{expected} [{low}, {high}]")
+            yield task.name, f"{value:g}", *shares, *(efforts or ["∞"] * len(SCALES))
+
+
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # (a task without sub-goals, the same one with them)
     "sub_goal_pairs": lambda obstructed: measures.pairs_but_for("subgoals", obstructed),
@@ -256,7 +276,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # the tilts of a grasped object that the task of solved runs limits, each with its limit
     "limited_tilts": lambda condition: [
         (term, limit.limit)
-        for term in TILTS
+        for term in measures.TILTS
         for limit in (getattr(condition.planner.objective, term),)
         if limit is not None and condition.solved
     ],
@@ -270,4 +290,10 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         if (pairs := measures.allowed_contacts(condition))
         else ""
     ),
+    "sizes": lambda results: measures.tasks(results, "num_offspring"),
+    "num_runs": lambda sizes: sum(c.done for c in sizes.conditions),
+    "size_ratios": lambda sizes, settings: {
+        metric: compare_sizes(sizes, metric, settings) for metric in METRICS
+    },
+    "are_compared": lambda size_ratios: any(size_ratios.values()),
 }

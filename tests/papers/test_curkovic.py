@@ -9,7 +9,7 @@ import pytest
 
 from evoexp.condition import Prepared
 from evoexp.configuration import compose
-from evoexp.papers.curkovic import compared_settings, measures
+from evoexp.papers.curkovic import claims, measures
 from evoexp.papers.curkovic.figures import (
     methods,
     robot_motions,
@@ -141,21 +141,21 @@ def test_a_refuted_run_counts_as_worse_than_any(motion: ConditionResults) -> Non
     assert measures.exemplar(some) == 2  # the cheapest one that is not refuted
     none = changed(motion, costs, np.array([True] * 3))
     assert measures.exemplar(none) == 1
-    assert np.isnan(compared_settings.not_refuted(none)).all()
+    assert np.isnan(claims.not_refuted(none)).all()
 
 
 def test_shares_of_a_gain_are_what_medians_say(motion: ConditionResults) -> None:
     rng, false = np.random.default_rng(0), np.zeros(40, dtype=bool)
     costs = [level + 0.1 * rng.random(40) for level in (10.0, 9.0, 8.0)]
     nothing, elites, hall = (changed(motion, each, false) for each in costs)
-    gain, settings = compared_settings.gains(9.0)[0], page_settings("curkovic_hall")
-    found = compared_settings.share(gain, (nothing, elites, hall), settings)
+    gain, settings = claims.gains(9.0)[0], page_settings("curkovic_hall")
+    found = claims.share(gain, (nothing, elites, hall), settings)
     none, some, most = map(np.median, costs)
     assert found.value == pytest.approx((none - some) / (none - most))
     assert found.interval.low < found.value < found.interval.high < found.interval.low + 0.1
     assert found.n == (40, 40, 40)
     # a hall that gains nothing leaves no share
-    nobody = compared_settings.share(gain, (hall, elites, nothing), settings)
+    nobody = claims.share(gain, (hall, elites, nothing), settings)
     assert np.isnan([nobody.value, *nobody.interval]).all()
 
 
@@ -168,7 +168,7 @@ def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None
 
 def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
-    one, two = compared_settings.families(results)
+    one, two = claims.families(results)
     rates = [f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")]
     assert [other.label for _, other in one.pairs] == rates
     assert {first.label for first, _ in two.pairs} == {"Eq. 10, symmetric"}
@@ -182,7 +182,7 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
     results = smoke_results(outputs, "curkovic_stationary")
     both = results._replace(conditions=results.conditions[::-1])  # whatever comes first
     for each in (results, both):
-        ((one, other),) = compared_settings.families(each)[0].pairs
+        ((one, other),) = claims.families(each)[0].pairs
         assert (one.label, other.label) == ("configurations only", "5 substeps")
     found = page(outputs, "curkovic_stationary", "curkovic_sweep")
     assert found.claims == ()

@@ -1,7 +1,7 @@
 """Measures of Curkovic et al. 2013: executed motions, effort to a threshold, known defects."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,27 @@ def fits(results: Results) -> bool:
     """Return whether there are results, and all of co-evolving robots."""
     problems = [c.prepared.problem for c in results.with_data]
     return bool(problems) and all(isinstance(problem, Problem) for problem in problems)
+
+
+def enveloped(condition: ConditionResults) -> bool:
+    """Return whether the search tests more of the robots than their lines."""
+    collision = condition.planner.collision
+    return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
+
+
+def kinds(
+    condition: ConditionResults, radius_conditions: Sequence[ConditionResults]
+) -> dict[str, bool]:
+    """Tell what a scene is: `many` robots, one `still`, two of `thick` bodies or `crossing` lines.
+
+    Figs. 8 and 9 (`fig_8`) show two robots of one radius; `other` are motions of no figure.
+    """
+    problem = condition.problem(Problem)
+    many, all_move = len(problem.start) > 2, bool(problem.moving.all())
+    two, thick = all_move and not many, enveloped(condition)
+    found = {"many": many, "still": not (many or all_move), "fig_8": two and not radius_conditions}
+    found |= {"thick": two and thick, "crossing": two and not thick}
+    return found | {"other": not (found["still"] or found["fig_8"])}
 
 
 def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:

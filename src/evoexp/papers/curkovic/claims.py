@@ -86,12 +86,6 @@ def _twin(results: Results, condition: ConditionResults, other: str) -> str:
     return max((c.label for c in alike), key=lambda label: label.count(", "), default="")
 
 
-def larger_radius(judge: Judge, compared_radii: Rows) -> Iterator[Claim]:
-    """Judge that a larger radius forces the robots further apart."""
-    for row in compared_radii:
-        yield judge.on("larger_radius", pair=row.quantity).better(row, "larger")
-
-
 def families(results: Results) -> tuple[Family, ...]:
     """Return the families of a sweep.
 
@@ -379,6 +373,10 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         condition, settings.threshold_ratio * measures.lower_bound(condition)
     ),
     "refuted_motions": lambda defects: defects.refuted,
+    # a larger radius forces the robots further apart
+    "larger_radius": lambda judge, compared_radii: [
+        judge.on("larger_radius", pair=row.quantity).better(row, "larger") for row in compared_radii
+    ],
     "tool_comparisons": lambda compared_radii: (
         [("Largest against smallest radius", compared_radii)] if compared_radii else []
     ),

@@ -165,11 +165,6 @@ def near_best(condition: ConditionResults, results: Results, rules: Rules) -> Bo
     return np.asarray(condition.column("best_cost") <= most * known)
 
 
-def early_cost(condition: ConditionResults) -> FloatArray:
-    """Return the cost of each run's best team at generation 30, (done,); inf: it has none."""
-    return _best_until(condition, "index", EARLY)
-
-
 def cost_at_equal_effort(condition: ConditionResults, results: Results) -> FloatArray:
     """Return the cost of each run's best team after as many evaluations as the shortest run has.
 
@@ -327,6 +322,8 @@ def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # cost of each run's best team at generation 30, (done,); inf: it has none
+    "early_cost": lambda condition: _best_until(condition, "index", EARLY),
     "too_fast": lambda condition: times_over_limit(condition) > 1.0,  # by Eq. 2, (done,)
     "touching": lambda condition: touches(condition)[solved(condition)],  # of the solved motions
     # expected running time to a cost in whole evaluations, (1,)

@@ -173,11 +173,6 @@ def printed_shares(results: Results) -> dict[str, float]:
     return {f"error below {p.bound:g}": p.proportion.share for p in points}
 
 
-def stopping_values_differ(conditions: tuple[ConditionResults, ...]) -> bool:
-    """Return whether searches stop at different values."""
-    return len({c.planner.stop_cost_sp2 for c in conditions}) > 1
-
-
 def share_rows(
     results: Results, refuted: Callable[[ConditionResults], RefutedMotions]
 ) -> list[tuple[str, int, str, Proportion]]:
@@ -379,6 +374,10 @@ def _median(condition: ConditionResults, values: Values) -> str:
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "bounds": lambda: BOUNDS,
+    # searches stop at different values
+    "stopping_values_differ": lambda conditions: (
+        len({c.planner.stop_cost_sp2 for c in conditions}) > 1
+    ),
     "anywhere": lambda refuted: refuted.anywhere,  # accepted motions that touch an obstacle
     "clear": lambda anywhere: Proportion(anywhere.total - anywhere.having, anywhere.total),
     "median_error": lambda condition: _median(condition, errors),

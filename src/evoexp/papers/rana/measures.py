@@ -137,20 +137,15 @@ def margin(condition: ConditionResults) -> float:
     return condition.problem(Problem).security_margin
 
 
-def _scenes(results: Results) -> list[tuple[Results, str]]:
+def scenes(results: Results) -> list[tuple[Results, str]]:
+    """Return all conditions of each scene, and the end of its figure's stem."""
     suffixes = {c.label: suffix for c, suffix in results.suffixed}
-    scenes = grouped(results.conditions, lambda c: (c.robot, c.scenario))
     found = [
         (results._replace(conditions=own), [suffixes[c.label] for c in own if c.label in suffixes])
-        for own in scenes
+        for own in grouped(results.conditions, lambda c: (c.robot, c.scenario))
     ]
     drawn = [(scene, own[0]) for scene, own in found if own]
     return [(scene, suffix if len(drawn) > 1 else "") for scene, suffix in drawn]
-
-
-def safety_share(condition: ConditionResults) -> FloatArray:
-    """Return the least distance of centres between via-points in units of the safety distance."""
-    return np.asarray(condition.column(BETWEEN) / margin(condition))
 
 
 def refuted(condition: ConditionResults) -> Proportion:
@@ -310,17 +305,15 @@ def speed_variation(condition: ConditionResults) -> FloatArray:
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # how much longer than the straight line each run's best paths are, (done,) [deg]
     "longer": lambda condition: length(condition) - straight_length(condition),
+    # least distance of centres between via-points in units of the safety distance, (done,) [-]
+    "safety_share": lambda condition, margin: condition.column(BETWEEN) / margin,
     "median_longer": lambda longer: float(np.median(longer)),
     # the beginning of a line about a condition: nothing if there is no other one
     "who": lambda results, condition: f"{condition.label}: " if len(results.main) > 1 else "",
     "arms": lambda main: " and ".join(
         ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
     ),
-    # all conditions of each scene in the plane, or in space, and the end of its figure's stem
-    "planar_scenes": lambda results: [s for s in _scenes(results) if planar(s[0].with_data[0])],
-    "spatial_scenes": lambda results: [
-        s for s in _scenes(results) if not planar(s[0].with_data[0])
-    ],
+    "is_flat": lambda scene: planar(scene.with_data[0]),
     "straight_terms": lambda condition: condition.evaluate(straight_line(condition)),
     # runs whose centres, or bodies, come closer than the safety distance
     "dips": lambda condition: int(np.sum(condition.column(BETWEEN) < margin(condition))),

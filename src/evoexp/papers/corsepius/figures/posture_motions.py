@@ -199,7 +199,6 @@ def draw_scope(table: pd.DataFrame) -> Figure:
 
 
 def _draw_ends(axes: Axes, path: pd.DataFrame) -> None:
-    """Draw the start and the end of a path."""
     look: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
     axes.plot(path["x"].iloc[:1], path["y"].iloc[:1], "s", markersize=6, label="start", **look)
     axes.plot(path["x"].iloc[-1:], path["y"].iloc[-1:], "*", markersize=9, label="end", **look)
@@ -318,7 +317,6 @@ def draw_trap(table: pd.DataFrame) -> Figure:
 
 
 def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
-    """Draw the cost over two joints, the stuck posture and its scope."""
     wide = cells.pivot(index="y", columns="x", values="value")
     look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
     shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)

@@ -172,7 +172,6 @@ def draw_tools(table: pd.DataFrame) -> Figure:
 
 
 def _links(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:
-    """Return the links of all robots at every sample."""
     assembly = prepared.problem.assembly
     places = motion_geometry.joint_positions(assembly, sampled.q)
     rows = [

@@ -97,7 +97,6 @@ def spatial_paths_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
-    """Return one solution's joint angles and tips."""
     problem = condition.problem(Problem)
     q = motion_geometry.configurations(condition.prepared, solution)
     places = motion_geometry.joint_positions(problem.assembly, q)

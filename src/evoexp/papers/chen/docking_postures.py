@@ -22,6 +22,7 @@ METHODS = {
     "subgradient": "subgradient",
 }  # conventional methods: names on the page → names in the records of the reference
 AROUND, STEP = 10.0, 0.05  # [deg] from the optimum, where near postures are looked for
+TERMS = ("torque_norm", "torque_max", "obstacle", "manipulability")  # of E, in tables
 CLOSE = (0.001, 0.01)  # [-] gaps to the optimum; shares of runs within them are given
 MINIMAX, MANIPULABILITY = "minimax torque", "manipulability and torque"
 
@@ -179,15 +180,11 @@ def posture_rows(cases: list[Case]) -> Iterator[tuple[str, ...]]:
             if angles is not None:
                 found = case.measured(angles)
                 row = (
-                    case.name,
-                    name,
+                    *(case.name, name),
                     ", ".join(f"{found[f'theta_{k}_deg']:.2f}" for k in (1, 2, 3)),
                     f"{found['platform_x']:.4f}",
                     ", ".join(f"{found[f'torque_{k}']:.3f}" for k in (1, 2, 3)),
-                    *(
-                        f"{found[term]:.4g}"
-                        for term in ("torque_norm", "torque_max", "obstacle", "manipulability")
-                    ),
+                    *(f"{found[term]:.4g}" for term in TERMS),
                     f"{found['cost']:.6g}",
                 )
                 yield tuple(cell.replace("-", "−") for cell in row)

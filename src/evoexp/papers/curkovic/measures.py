@@ -43,7 +43,7 @@ def enveloped(condition: ConditionResults) -> bool:
 def kinds(
     condition: ConditionResults, radius_conditions: Sequence[ConditionResults]
 ) -> dict[str, bool]:
-    """Name the kind of a scene: `many` robots, one `still`, two of `thick` bodies, `crossing` lines.
+    """Name the kind of a scene: `many` robots, one `still`, two of `thick` or `crossing` bodies.
 
     Figs. 8 and 9 (`fig_8`) show two robots of one radius; `other` are motions of no figure.
     """

@@ -8,15 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.papers.chen import cases as case_results
-from evoexp.papers.chen import path_claims
-from evoexp.papers.chen.cases import Case
+from evoexp.papers.chen import docking_postures, path_claims
+from evoexp.papers.chen.docking_postures import Case
 from evoexp.papers.chen.figures import placements
 from evoexp.papers.chen.figures.printed_fields import MISSING, SURPLUS, WRONG, compare
 from evoexp.papers.chen.path_claims import inside_points, routes, signature
+from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.statistics import judging
 from report_samples import page_claims, smoke_report, smoke_results
 
+PRINTED = read_page_file("evoexp.papers.chen").functions["printed_postures"]()
 CENTRES = inside_points([(2, 2, 3, 3), (6, 2, 7, 3)])
 ABOVE = np.array([[0, 2], [1, 4], [4, 5], [9, 2]], dtype=float)
 BELOW = np.array([[0, 2], [1, 1], [8, 1], [9, 2]], dtype=float)
@@ -67,11 +68,11 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
 
 @pytest.fixture(scope="module")
 def cases(outputs: Path) -> list[Case]:
-    return case_results.cases(smoke_results(outputs, "chen_placement"))
+    return docking_postures.cases(smoke_results(outputs, "chen_placement"), PRINTED)
 
 
 def test_conditions_are_told_apart(cases: list[Case]) -> None:
-    assert [case.name for case in cases] == list(case_results.PRINTED)
+    assert [case.name for case in cases] == list(PRINTED)
     for case in cases:
         assert case.landscape is None and all(c is not None for c in case[1:6])
         assert list(case.evolved) == ["GA", "GA, elitism", "random search"]

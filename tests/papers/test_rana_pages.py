@@ -7,7 +7,7 @@ import pytest
 
 from evoexp.papers.rana import claims as paper_claims
 from evoexp.papers.rana import measures
-from evoexp.papers.rana.figures import planar_motion
+from evoexp.papers.rana.figures import arm_motions
 from evoexp.records import generations
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Page
@@ -50,11 +50,11 @@ def test_approaches_by_kind_make_the_recorded_clearance(obstacles: ConditionResu
 
 
 def test_distances_to_obstacles_are_drawn_for_every_replicate(obstacles: ConditionResults) -> None:
-    table = planar_motion.distances_table(obstacles, 5)
+    table = arm_motions.distances_table(obstacles, 5)
     for kind, margin in ((measures.BETWEEN_ARMS, 1.0), (measures.TO_OBSTACLES, 0.5)):
         own = table[table["kind"] == kind]
         assert set(own["safety_distance"]) == {margin}
-        exact = own[own["series"].isin([planar_motion.CLOSEST, planar_motion.REFUTED])]
+        exact = own[own["series"].isin([arm_motions.CLOSEST, arm_motions.REFUTED])]
         assert len(exact) == obstacles.done, "no replicate is dropped"
     # by hand: the least distance of circle centres to the ball at (5, 4.6) of radius 0.4
     problem = obstacles.prepared.problem
@@ -62,7 +62,7 @@ def test_distances_to_obstacles_are_drawn_for_every_replicate(obstacles: Conditi
     ball = np.linalg.norm(centres - [5.0, 4.6, 0.0], axis=1).min() - 0.4
     assert problem.obstacle_distances(problem.start[:, None])[0] <= ball + 1e-9
     assert table["distance"].min() >= 0.0
-    titles = [axes.get_title() for axes in planar_motion.draw_distances(table).axes]
+    titles = [axes.get_title() for axes in arm_motions.draw_distances(table).axes]
     assert [title[0] for title in titles] == ["a", "c", "b", "d"]
 
 

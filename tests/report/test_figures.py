@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from evoexp.cli import main
 from evoexp.configuration import compose
-from evoexp.papers.rana.figures import planar_models, planar_motion
+from evoexp.papers.rana.figures import arm_models, arm_motions
 from evoexp.report.figures import convergence, side_by_side, style
 from evoexp.report.figures.side_by_side import draw_box
 from evoexp.report.pages.page_builder import page_of
@@ -152,7 +152,7 @@ def test_fitness_is_the_papers(results: Results) -> None:
 
 
 def test_arms_stand_at_start_and_goal_of_table_2(ga: ConditionResults) -> None:
-    table = planar_models.arms_table(ga)
+    table = arm_models.arms_table(ga)
     first = table[(table["posture"] == "start") & (table["joint"] == 0)]
     assert list(first["angle_deg"]) == [45.0, 225.0]
     assert list(first["reference_deg"] % 360.0) == [0.0, 0.0]
@@ -160,19 +160,19 @@ def test_arms_stand_at_start_and_goal_of_table_2(ga: ConditionResults) -> None:
     length = np.hypot(table["x_end"] - table["x"], table["y_end"] - table["y"])
     np.testing.assert_allclose(length, 4.0)
     words = {"θ₁ = 45°", "θ₂ = 225°", "α₁ = 225°", "x [unit]"}
-    assert words <= texts(planar_models.draw_arms(table))
+    assert words <= texts(arm_models.draw_arms(table))
 
 
 def test_via_points_are_those_of_the_solution(ga: ConditionResults) -> None:
-    table = planar_models.via_points_table(ga)
+    table = arm_models.via_points_table(ga)
     final = table[table["stage"] == "best at the end"][["joint_1_deg", "joint_2_deg"]]
     np.testing.assert_array_equal(final.to_numpy().ravel(), ga.solutions[ga.best_replicate])
-    words = texts(planar_models.draw_via_points(table))
+    words = texts(arm_models.draw_via_points(table))
     assert {"θ₁ [deg]", "α₂ [deg]", "0", "20", "arm 2"} <= words
 
 
 def test_circles_show_the_least_distance(ga: ConditionResults) -> None:
-    table = planar_models.circles_table(ga)
+    table = arm_models.circles_table(ga)
     elements = table.set_index("element")
     assert len(elements.loc["circle"]) == 18
     centres = elements.loc["centres"]
@@ -182,12 +182,12 @@ def test_circles_show_the_least_distance(ga: ConditionResults) -> None:
     drawn = np.hypot(centres["x_end"] - centres["x"], centres["y_end"] - centres["y"])
     assert drawn == pytest.approx(truth)
     assert elements.loc["bodies", "distance"] <= truth + 1e-9
-    words = texts(planar_models.draw_circles(table))
+    words = texts(arm_models.draw_circles(table))
     assert f"least distance of circle centres: {truth:.3f} unit" in words
 
 
 def test_snapshots_cut_the_motion_into_stages(ga: ConditionResults) -> None:
-    table = planar_motion.snapshots_table(ga)
+    table = arm_motions.snapshots_table(ga)
     stages = table.groupby("stage")[["first", "last"]].first().to_numpy().tolist()
     assert stages == [[0, 4], [4, 8], [8, 12], [12, 16], [16, 20], [0, 20]]
     whole = table[table["stage"] == 5].set_index(["instant", "arm", "link"])
@@ -195,7 +195,7 @@ def test_snapshots_cut_the_motion_into_stages(ga: ConditionResults) -> None:
     tip = whole.loc[(0, 0, 1), ["x_end", "y_end"]].tolist()
     assert tip == pytest.approx([4.0 * np.sqrt(0.5), 4.0 * np.sqrt(0.5) - 4.0])
     words = {"instants 0–4", "all instants 0–20", "arm 1", "arm 2", "y [unit]"}
-    assert words <= texts(planar_motion.draw_snapshots(table))
+    assert words <= texts(arm_motions.draw_snapshots(table))
 
 
 @pytest.mark.parametrize(
@@ -212,28 +212,28 @@ def test_paths_of_all_or_of_some_replicates_are_drawn(
     condition = dataclasses.replace(ga)
     solutions = [*ga.solutions.values()] * copies
     vars(condition)["solutions"] = dict(enumerate(solutions))
-    monkeypatch.setattr(planar_motion, "MOST_PATHS", most)
-    table = planar_motion.paths_table(condition)
+    monkeypatch.setattr(arm_motions, "MOST_PATHS", most)
+    table = arm_motions.paths_table(condition)
     assert sorted(table["replicate"].unique()) == list(range(-1, min(len(solutions), most)))
     ends = table[(table["arm"] == 0) & (table["instant"] == 20)][["joint_1_deg", "joint_2_deg"]]
     np.testing.assert_allclose(ends, [[135.0, 135.0]] * len(ends))
-    assert words in texts(planar_motion.draw_paths(table, ["joint_1_deg", "joint_2_deg"]))
+    assert words in texts(arm_motions.draw_paths(table, ["joint_1_deg", "joint_2_deg"]))
 
 
 def test_distances_are_best_and_envelope(ga: ConditionResults) -> None:
-    table = planar_motion.distances_table(ga, 4)
+    table = arm_motions.distances_table(ga, 4)
     rows = table.set_index(["measure", "series", "instant"])["distance"]
-    centres, links = rows.loc[planar_motion.CENTRES], rows.loc[planar_motion.LINKS]
+    centres, links = rows.loc[arm_motions.CENTRES], rows.loc[arm_motions.LINKS]
     for each in (centres, links):
-        best = each.loc[planar_motion.BEST]
-        assert (each.loc[planar_motion.LOWEST] <= best).all()
-        assert (best <= each.loc[planar_motion.HIGHEST]).all()
-        at = each.loc[planar_motion.AT_VIA_POINTS]
+        best = each.loc[arm_motions.BEST]
+        assert (each.loc[arm_motions.LOWEST] <= best).all()
+        assert (best <= each.loc[arm_motions.HIGHEST]).all()
+        at = each.loc[arm_motions.AT_VIA_POINTS]
         assert list(at.index) == list(range(21)) and at.equals(best[at.index])
-    straight = links.loc[planar_motion.STRAIGHT]
-    assert (straight <= centres.loc[planar_motion.STRAIGHT] + 1e-9).all()  # circles on links
+    straight = links.loc[arm_motions.STRAIGHT]
+    assert (straight <= centres.loc[arm_motions.STRAIGHT] + 1e-9).all()  # circles on links
     assert straight.min() == 0.0
-    words = texts(planar_motion.draw_distances(table))
+    words = texts(arm_motions.draw_distances(table))
     assert {"below the required distance: 1 unit between arms", "least distance [unit]"} <= words
 
 

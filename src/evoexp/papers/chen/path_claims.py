@@ -269,16 +269,15 @@ def evolution(
 ) -> Claim:
     """Judge that evolution helps, and tell its gain over the best control."""
     rows = compared([(condition, c) for c in controls], by_column(COST), judge.settings)
-    medians = {control_name(c): float(np.median(c.column(COST))) for c in controls}
+    names = {c.label: control_name(c) for c in controls}
+    medians = {names[c.label]: float(np.median(c.column(COST))) for c in controls}
     best = min(medians, key=lambda name: medians[name])
     median = float(np.median(condition.column(COST)))
     gain = medians[best] - median
     told = "; ".join(
-        f"against {control_name(c)} (median {markdown.number(medians[control_name(c)])}): "
+        f"against {names[row.quantity]} (median {markdown.number(medians[names[row.quantity]])}): "
         f"{evidence(row, 'lower cost')}"
-        for c in controls
         for row in rows
-        if row.quantity == c.label
     )
     words: dict[str, object] = {"median": median, "best": best, "told": told, "gain": abs(gain)}
     words |= {

@@ -17,12 +17,10 @@ from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Interval, quantile
 from evoexp.report.statistics.judging import Judge
 
-TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 RECOMMENDED = 100.0  # individuals (section 5)
-REASONABLE = {RECOMMENDED: ("reasonable", "section 5"), 50.0: ("typical", "section 4.2")}
-# what else a smaller population changes
-KEPT, SCALED = "all else equal", "parents in proportion, patience in evaluations"
+SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
+SCALED = "parents in proportion, patience in evaluations"
 # (task, size, its condition, that of the recommended size)
 SizePair = tuple[str, float, ConditionResults, ConditionResults]
 METRICS: dict[str, Values] = {
@@ -93,38 +91,18 @@ class SizeComparison(NamedTuple):
         return int(self.interval.low > self.bound) - int(self.interval.high < self.bound)
 
 
-def judge_study(
-    judge: Judge, results: Results, sizes: Tasks, size_ratios: dict[str, list[SizeComparison]]
-) -> tuple[Claim, ...]:
-    """Judge the claims on the size."""
-    kept, scaled = list(_beside_recommended(sizes)), list(_scaled(results, sizes))
-    rows = _compared(scaled, "evaluations", judge.settings)
-    return (
-        *(claim for metric, rows in size_ratios.items() for claim in _larger(judge, metric, rows)),
-        *(_over_proportional(judge, metric, KEPT, rows) for metric, rows in size_ratios.items()),
-        _over_proportional(judge, "evaluations", SCALED, rows),
-        _converges_less(judge, KEPT, kept),
-        _converges_less(judge, SCALED, scaled),
-        *(
-            _reasonable(judge, size, metric, sizes, values)
-            for size in REASONABLE
-            for metric, values in METRICS.items()
-        ),
-    )
-
-
-def _beside_recommended(found: Tasks) -> Iterator[SizePair]:
+def _beside_recommended(sizes: Tasks) -> Iterator[SizePair]:
     """Yield (task, size, its condition, that of the recommended size) where either solves it."""
-    for task in found:
+    for task in sizes:
         own = task.by_value.get(RECOMMENDED)
         for value, c in task.by_value.items():
             if own is not None and value != RECOMMENDED and (own.solved or c.solved):
                 yield task.name, value, c, own
 
 
-def _scaled(results: Results, found: Tasks) -> Iterator[SizePair]:
+def _scaled(results: Results, sizes: Tasks) -> Iterator[SizePair]:
     """Yield the same of sizes whose parents and patience change with the size."""
-    for task in found:
+    for task in sizes:
         if own := task.by_value.get(RECOMMENDED):
             for c in results.main:
                 scaled = c.planner.ga.num_parents != own.planner.ga.num_parents
@@ -132,15 +110,9 @@ def _scaled(results: Results, found: Tasks) -> Iterator[SizePair]:
                     yield task.name, float(c.planner.ga.num_offspring), c, own
 
 
-def compare_sizes(found: Tasks, metric: str, settings: ReportSettings) -> list[SizeComparison]:
-    """Compare every size with the recommended one, task by task.
-
-    Tasks that neither size ever solves are left out.
-    """
-    return _compared(list(_beside_recommended(found)), metric, settings)
-
-
-def _compared(pairs: list[SizePair], metric: str, settings: ReportSettings) -> list[SizeComparison]:
+def compare_sizes(
+    pairs: list[SizePair], metric: str, settings: ReportSettings
+) -> list[SizeComparison]:
     """Compare efforts, as one family: levels of intervals are Bonferroni's over all of them."""
     level = 1.0 - (1.0 - settings.confidence) / max(1, len(pairs))
     rows = []
@@ -172,9 +144,9 @@ def _unless(against: object, favour: object) -> bool | None:
     return False if against else True if favour else None
 
 
-def _larger(judge: Judge, metric: str, compared: list[SizeComparison]) -> Iterator[Claim]:
+def larger_sizes(judge: Judge, metric: str, ratios: list[SizeComparison]) -> Iterator[Claim]:
     """Judge that nothing larger is faster, on any task, or, weaker, that there are such tasks."""
-    rows = [row for row in compared if row.value > RECOMMENDED]
+    rows = [row for row in ratios if row.value > RECOMMENDED]
     says: dict[str, list[int]] = {}
     for row in rows:
         says.setdefault(row.task, []).append(row.says)
@@ -190,11 +162,9 @@ def _larger(judge: Judge, metric: str, compared: list[SizeComparison]) -> Iterat
     yield hearing.own(words, f"{len(says)} tasks", _unless(not never, slower))
 
 
-def _over_proportional(
-    judge: Judge, metric: str, how: str, compared: list[SizeComparison]
-) -> Claim:
+def over_proportional(judge: Judge, metric: str, how: str, ratios: list[SizeComparison]) -> Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
-    rows = [row for row in compared if row.value < RECOMMENDED]
+    rows = [row for row in ratios if row.value < RECOMMENDED]
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
     told: dict[str, object] = {"above": _ratios(rows, 1), "below": _ratios(rows, -1)}
@@ -203,9 +173,9 @@ def _over_proportional(
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
 
-def _converges_less(judge: Judge, how: str, sizes: list[SizePair]) -> Claim:
+def converges_less(judge: Judge, how: str, size_pairs: list[SizePair]) -> Claim:
     """Judge that smaller populations meet their goals less often."""
-    pairs = [pair for pair in sizes if pair[1] < RECOMMENDED]
+    pairs = [pair for pair in size_pairs if pair[1] < RECOMMENDED]
     shares = [(run_measures.success(own), run_measures.success(c)) for _, _, c, own in pairs]
     says = [
         judging.greater(*pair, p, judge.settings.significance)
@@ -222,12 +192,14 @@ def _converges_less(judge: Judge, how: str, sizes: list[SizePair]) -> Claim:
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 
-def _reasonable(judge: Judge, size: float, metric: str, found: Tasks, values: Values) -> Claim:
+def reasonable(
+    judge: Judge, size: float, word: str, where: str, metric: str, sizes: Tasks
+) -> Claim:
     """Judge that a size is a reasonable one on every task that can be solved."""
     factors = {}
-    for task in found:
+    for task in sizes:
         efforts = {
-            v: inference.expected_effort(values(c), run_measures.solved(c))
+            v: inference.expected_effort(METRICS[metric](c), run_measures.solved(c))
             for v, c in task.by_value.items()
         }
         best = min(efforts, key=lambda value: efforts[value])
@@ -236,10 +208,29 @@ def _reasonable(judge: Judge, size: float, metric: str, found: Tasks, values: Va
     texts = (f"{name} {_short(factor)} (best: {b:g})" for name, (factor, b) in factors.items())
     most = judge.rules["reasonable"].limits["most"]
     told = f"effort of {size:g} over that of the best size: {', '.join(texts) or '–'}"
-    word, where = REASONABLE[size]
     hearing = judge.on("reasonable", size=f"{size:g}", word=word, where=where, metric=metric)
     against = any(factor > most for factor, _ in factors.values())
     return hearing.own(told, f"{len(factors)} tasks", _unless(against, factors))
+
+
+def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...]]:
+    """Yield success and expected running times with their intervals, a row per task and size."""
+    level = settings.confidence
+    for task in sizes:
+        for value, c in task.by_value.items():
+            shares = (
+                count(c).with_interval(level) for count in (run_measures.success, measures.refuted)
+            )
+            efforts = []  # expected running times with their intervals
+            for metric, scale in SCALES.items() if c.solved else ():
+                runs = METRICS[metric](c), run_measures.solved(c)
+                interval = inference.expected_interval(*runs, level, settings.num_resamples)
+                expected, low, high = (
+                    markdown.number(float(f"{scale * value:.3g}"))
+                    for value in (inference.expected_effort(*runs), *interval)
+                )
+                efforts.append(f"{expected} [{low}, {high}]")
+            yield task.name, f"{value:g}", *shares, *(efforts or ["∞"] * len(SCALES))
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
@@ -256,7 +247,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # the tilts of a grasped object that the task of solved runs limits, each with its limit
     "limited_tilts": lambda condition: [
         (term, limit.limit)
-        for term in TILTS
+        for term in measures.TILTS
         for limit in (getattr(condition.planner.objective, term),)
         if limit is not None and condition.solved
     ],
@@ -270,4 +261,20 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         if (pairs := measures.allowed_contacts(condition))
         else ""
     ),
+    "sizes": lambda results: measures.tasks(results, "num_offspring"),
+    "num_runs": lambda sizes: sum(c.done for c in sizes.conditions),
+    # what else a smaller population changes, with the pairs of sizes
+    "paired_sizes": lambda results, sizes: [
+        ("all else equal", list(_beside_recommended(sizes))),
+        (SCALED, list(_scaled(results, sizes))),
+    ],
+    "size_ratios": lambda paired_sizes, settings: {
+        metric: compare_sizes(paired_sizes[0][1], metric, settings) for metric in METRICS
+    },
+    # (metric, what else changes, ratios)
+    "smaller_sizes": lambda size_ratios, paired_sizes, settings: [
+        *((metric, paired_sizes[0][0], ratios) for metric, ratios in size_ratios.items()),
+        ("evaluations", SCALED, compare_sizes(paired_sizes[1][1], "evaluations", settings)),
+    ],
+    "are_compared": lambda size_ratios: any(size_ratios.values()),
 }

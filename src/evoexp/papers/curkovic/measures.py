@@ -1,7 +1,7 @@
 """Measures of Curkovic et al. 2013: executed motions, effort to a threshold, known defects."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,27 @@ def fits(results: Results) -> bool:
     """Return whether there are results, and all of co-evolving robots."""
     problems = [c.prepared.problem for c in results.with_data]
     return bool(problems) and all(isinstance(problem, Problem) for problem in problems)
+
+
+def enveloped(condition: ConditionResults) -> bool:
+    """Return whether the search tests more of the robots than their lines."""
+    collision = condition.planner.collision
+    return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
+
+
+def kinds(
+    condition: ConditionResults, radius_conditions: Sequence[ConditionResults]
+) -> dict[str, bool]:
+    """Name the kind of a scene: `many` robots, one `still`, two of `thick` or `crossing` bodies.
+
+    Figs. 8 and 9 (`fig_8`) show two robots of one radius; `other` are motions of no figure.
+    """
+    problem = condition.problem(Problem)
+    many, all_move = len(problem.start) > 2, bool(problem.moving.all())
+    two, thick = all_move and not many, enveloped(condition)
+    found = {"many": many, "still": not (many or all_move), "fig_8": two and not radius_conditions}
+    found |= {"thick": two and thick, "crossing": two and not thick}
+    return found | {"other": not (found["still"] or found["fig_8"])}
 
 
 def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:
@@ -144,11 +165,6 @@ def near_best(condition: ConditionResults, results: Results, rules: Rules) -> Bo
     return np.asarray(condition.column("best_cost") <= most * known)
 
 
-def early_cost(condition: ConditionResults) -> FloatArray:
-    """Return the cost of each run's best team at generation 30, (done,); inf: it has none."""
-    return _best_until(condition, "index", EARLY)
-
-
 def cost_at_equal_effort(condition: ConditionResults, results: Results) -> FloatArray:
     """Return the cost of each run's best team after as many evaluations as the shortest run has.
 
@@ -252,8 +268,9 @@ def executed(prepared: Prepared, solution: FloatArray) -> Motion:
     return cubic_motion(polynomials)
 
 
-def sampled(motion: Motion, samples: int) -> SampledMotion:
-    """Sample a motion in absolute link angles."""
+def sampled(prepared: Prepared, solution: FloatArray, samples: int) -> SampledMotion:
+    """Sample the motion that a solution executes, so often per segment."""
+    motion = executed(prepared, solution)
     segments = motion.num_segments
     instants = np.arange(segments * samples + 1) / samples
     before = np.minimum(instants.astype(np.int64), segments - 1)
@@ -284,8 +301,8 @@ def tool_distance(condition: ConditionResults) -> FloatArray:
     """
     found, assembly = [], condition.prepared.problem.assembly
     for k in condition.summaries.index:
-        motion = executed(condition.prepared, condition.solutions[int(k)])
-        places = motion_geometry.joint_positions(assembly, sampled(motion, TOOL_SAMPLES).q)
+        motion = sampled(condition.prepared, condition.solutions[int(k)], TOOL_SAMPLES)
+        places = motion_geometry.joint_positions(assembly, motion.q)
         links = [(robot, start, end) for robot, link, start, end in places if link < 2]
         tips = {robot: end for robot, _, end in links}
         distances = (
@@ -305,6 +322,8 @@ def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # cost of each run's best team at generation 30, (done,); inf: it has none
+    "early_cost": lambda condition: _best_until(condition, "index", EARLY),
     "too_fast": lambda condition: times_over_limit(condition) > 1.0,  # by Eq. 2, (done,)
     "touching": lambda condition: touches(condition)[solved(condition)],  # of the solved motions
     # expected running time to a cost in whole evaluations, (1,)

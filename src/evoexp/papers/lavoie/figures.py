@@ -154,7 +154,6 @@ def _links(
 
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw ellipses, box and targets."""
     for row in records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
         look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2, "label": "ellipses"}

@@ -22,10 +22,7 @@ PRINTED = "as printed"  # label of the printed setting among the ablations
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
 COST = "best cost"
 BEST = comparisons.by_column("best_cost")
-COMPARED = (
-    Measure(COST, BEST),
-    Measure(EVENNESS, measures.unevenness, "deg"),
-)
+COMPARED = Measure(COST, BEST), Measure(EVENNESS, measures.unevenness, "deg")
 Controls = Sequence[ConditionResults]
 
 
@@ -72,9 +69,7 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
     if printed is None:
         return []
     others = [other for other in named.values() if other is not printed]
-    found = comparisons.compare_families(
-        [Family.of([printed, *others])], COMPARED[:2], judge.settings
-    )
+    found = comparisons.compare_families([Family.of([printed, *others])], COMPARED, judge.settings)
     rows = {one.measure.name: {row.quantity: row for row in one.rows} for one in found}
     parts = [other for other in others if other.label in PARTS]
     counts = {c.label: measures.refuted(c) for c in (printed, *parts)}
@@ -85,9 +80,10 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
         other = counts[part.label]
         says = [by[part.label].says(level) for by in rows.values() if part.label in by]
         says.append(judging.greater(other, own, p_value, level))
+        medians = [float(np.median(measures.unevenness(c))) for c in (printed, part)]
         told: dict[str, object] = {
-            "cost": _told(rows[COST].get(part.label), COST, "–"),
-            "evenness": _told(rows[EVENNESS].get(part.label), EVENNESS, "deg", (printed, part)),
+            "cost": _told(rows[COST].get(part.label), COST, ""),
+            "evenness": _told(rows[EVENNESS].get(part.label), EVENNESS, " deg", medians),
         }
         told |= {"own": own, "other": other, "p": p_value}
         hearing = judge.on("operators_improve", who=who, without=part.label)
@@ -104,23 +100,14 @@ def improves(says: list[int]) -> bool | None:
     return None if better == worse else better
 
 
-def _told(
-    row: Comparison | None,
-    name: str,
-    unit: str,
-    pair: tuple[ConditionResults, ConditionResults] | None = None,
-) -> str:
-    """Return a comparison in words, with the medians of both where the pair is given."""
+def _told(row: Comparison | None, name: str, unit: str, medians: Sequence[float] = ()) -> str:
+    """Return a comparison in words, with the medians with and without a part, where given."""
     if row is None:
         return f"{name}: nothing to compare"
-    shown = "" if unit == "–" else f" {unit}"
-    medians = ""
-    if pair is not None:
-        with_it, without = (markdown.number(float(np.median(measures.unevenness(c)))) for c in pair)
-        medians = f"{with_it}{shown} with, {without}{shown} without, "
-    difference = markdown.number(row.median_difference)
+    numbers = [f"{markdown.number(each)}{unit}" for each in (*medians, row.median_difference)]
+    of_both = "{} with, {} without, ".format(*numbers) if medians else ""
     told = judging.evidence(row, "lower")
-    return f"{name}: {medians}difference of medians {difference}{shown}, {told}"
+    return f"{name}: {of_both}difference of medians {numbers[-1]}, {told}"
 
 
 def evolution(results: Results, own_judge: Judge, condition: ConditionResults, who: str) -> Claim:
@@ -195,7 +182,4 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # a colliding instant costs so many straight paths of all arms together
     "share_of_path": lambda worth, straight_length: worth / straight_length,
     "percent_of_path": lambda share_of_path: 100.0 * share_of_path,
-    "median_longer": lambda condition: float(
-        np.median(measures.length(condition)) - measures.straight_length(condition)
-    ),
 }

@@ -1,4 +1,4 @@
-"""Measures of Rana & Zalzala 1995: motions of strings of via-points, and quantities of runs."""
+"""Measures of Rana & Zalzala 1995: motions of strings of via-points, quantities, operators."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -10,11 +10,11 @@ from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.records import FloatArray, generations
+from evoexp.records import BoolArray, FloatArray, generations
 from evoexp.report.figures import DECIMALS
 from evoexp.report.pages import markdown
 from evoexp.report.results import motion_geometry, run_measures
-from evoexp.report.results.run_measures import grouped, summed
+from evoexp.report.results.run_measures import counted, grouped, summed
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons
 from evoexp.report.statistics.comparisons import FamilyComparison
@@ -28,6 +28,8 @@ GENERATIONS = (0, 10, 50)  # whose pairs of strings are looked at
 PAIRS = 2000  # drawn of each generation
 BETWEEN_ARMS, TO_OBSTACLES = "between arms", "to obstacles"  # kinds of pairs of bodies
 STRAIGHT = "straight line"
+FRESH = 1000  # strings that nothing has selected
+UNEVEN, EVEN = 2.0, 1.05  # ratios of the longest step of a path to its shortest one (ours)
 
 
 # C3 + C4 + … of each run's best: sums of |step − mean step| (Eqs. 4, 5), (done,) [deg]
@@ -135,26 +137,15 @@ def margin(condition: ConditionResults) -> float:
     return condition.problem(Problem).security_margin
 
 
-def _scenes(results: Results) -> list[tuple[Results, str]]:
+def scenes(results: Results) -> list[tuple[Results, str]]:
+    """Return all conditions of each scene, and the end of its figure's stem."""
     suffixes = {c.label: suffix for c, suffix in results.suffixed}
-    scenes = grouped(results.conditions, lambda c: (c.robot, c.scenario))
     found = [
         (results._replace(conditions=own), [suffixes[c.label] for c in own if c.label in suffixes])
-        for own in scenes
+        for own in grouped(results.conditions, lambda c: (c.robot, c.scenario))
     ]
     drawn = [(scene, own[0]) for scene, own in found if own]
     return [(scene, suffix if len(drawn) > 1 else "") for scene, suffix in drawn]
-
-
-def longer(condition: ConditionResults) -> FloatArray:
-    """Return how much longer than the straight line each run's best paths are, (done,) [deg]."""
-    ratio = condition.column("term_path_length_ratio")
-    return np.asarray(straight_length(condition) * (ratio - 1.0))
-
-
-def safety_share(condition: ConditionResults) -> FloatArray:
-    """Return the least distance of centres between via-points in units of the safety distance."""
-    return np.asarray(condition.column(BETWEEN) / margin(condition))
 
 
 def refuted(condition: ConditionResults) -> Proportion:
@@ -231,17 +222,98 @@ def kept_apart(condition: ConditionResults) -> dict[int, float]:
     return found
 
 
+def fresh(condition: ConditionResults, *, redistributed: bool) -> FloatArray:
+    """Return new random walks (section 3.3), not relaxed, (nq, N + 1, `FRESH`) [deg]."""
+    settings = {"redistribution": redistributed, "relaxation_step": 0.0}
+    planner = condition.planner.model_copy(update=settings)
+    rng = np.random.Generator(np.random.PCG64(0))
+    return np.asarray(planner.sample(condition.problem(Problem), rng, FRESH))
+
+
+def steps(condition: ConditionResults, q: FloatArray) -> list[FloatArray]:
+    """Return the lengths of each arm's steps between via-points of q, (nq, N + 1, …) [deg]."""
+    arms = condition.problem(Problem).arm_slices
+    return [np.linalg.norm(np.diff(q[first:stop], axis=1), axis=0) for first, stop in arms]
+
+
+def _unequal(condition: ConditionResults, strings: FloatArray, ratio: float) -> np.ndarray:
+    """Return whether the steps of a path differ by more than a ratio, (arms, strings)."""
+    return np.array([s.max(axis=0) > ratio * s.min(axis=0) for s in steps(condition, strings)])
+
+
+def shortened(condition: ConditionResults) -> Proportion:
+    """Count the fresh strings, redistributed, that one relaxation makes shorter."""
+    strings = fresh(condition, redistributed=True)
+    relaxing = condition.planner.model_copy(update={"redistribution": False})
+    rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
+    relaxed = relaxing.improve(condition.problem(Problem), strings, rng)
+    before, after = (sum(s.sum(axis=0) for s in steps(condition, q)) for q in (strings, relaxed))
+    return counted(np.less(after, before))
+
+
+def crossed_jumps(condition: ConditionResults) -> Proportion:
+    """Count the paths that cross-over leaves with a jump, of pairs of fresh redistributed strings.
+
+    A child takes its path from another parent from a site on (section 3.4 b), as far as both are
+    close there. A jump is a step into the site of more than `UNEVEN` mean steps of the child.
+    """
+    problem = condition.problem(Problem)
+    strings = fresh(condition, redistributed=True)
+    num_points, rng = strings.shape[1], np.random.Generator(np.random.PCG64(0))
+    one, two = rng.permutation(FRESH).reshape(2, -1)
+    crossed, jumps = np.ones(len(one), dtype=bool), []
+    for first, stop in problem.arm_slices:
+        own = strings[first:stop]
+        site = rng.integers(1, num_points - 1, size=len(one))  # 1 … N − 1
+        gap = np.linalg.norm(own[:, site, one] - own[:, site, two], axis=0)
+        crossed &= gap < condition.planner.crossover_distance
+        from_mate = np.arange(num_points)[:, None] >= site
+        child = np.where(from_mate, own[:, :, two], own[:, :, one])
+        step = np.linalg.norm(np.diff(child, axis=1), axis=0)
+        jumps.append(step[site - 1, np.arange(len(site))] > UNEVEN * step.mean(axis=0))
+    return counted(np.array(jumps)[:, crossed].ravel())
+
+
+def falls(condition: ConditionResults, prefix: str) -> BoolArray:
+    """Return whether terms with a prefix, summed, fell in each run or are 0 at its end, (done,).
+
+    The best string of the last generation beside that of the first one.
+    """
+    found = []
+    for replicate, solution in condition.solutions.items():
+        first, last = (
+            sum(value for name, value in condition.evaluate(q).items() if name.startswith(prefix))
+            for q in (condition.first_solution(replicate), solution)
+        )
+        found.append(last < first or last == 0.0)
+    return np.array(found)
+
+
+def speed_variation(condition: ConditionResults) -> FloatArray:
+    """Return how much joint speed varies along each run's best motion, (done,) [-].
+
+    Standard deviation over mean of an arm's speed from via-point to via-point, which it passes in
+    equal times; the mean of all arms.
+    """
+    found = []
+    for solution in condition.solutions.values():
+        speeds = steps(condition, motion_geometry.configurations(condition.prepared, solution))
+        found.append(np.mean([speed.std() / speed.mean() for speed in speeds]))
+    return np.array(found)
+
+
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # how much longer than the straight line each run's best paths are, (done,) [deg]
+    "longer": lambda condition: length(condition) - straight_length(condition),
+    # least distance of centres between via-points in units of the safety distance, (done,) [-]
+    "safety_share": lambda condition, margin: condition.column(BETWEEN) / margin,
+    "median_longer": lambda longer: float(np.median(longer)),
     # the beginning of a line about a condition: nothing if there is no other one
     "who": lambda results, condition: f"{condition.label}: " if len(results.main) > 1 else "",
     "arms": lambda main: " and ".join(
         ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
     ),
-    # all conditions of each scene in the plane, or in space, and the end of its figure's stem
-    "planar_scenes": lambda results: [s for s in _scenes(results) if planar(s[0].with_data[0])],
-    "spatial_scenes": lambda results: [
-        s for s in _scenes(results) if not planar(s[0].with_data[0])
-    ],
+    "is_flat": lambda scene: planar(scene.with_data[0]),
     "straight_terms": lambda condition: condition.evaluate(straight_line(condition)),
     # runs whose centres, or bodies, come closer than the safety distance
     "dips": lambda condition: int(np.sum(condition.column(BETWEEN) < margin(condition))),
@@ -269,5 +341,24 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "told_apart": lambda first: ", ".join(
         f"{100 * share:.1f} % in generation {generation}"
         for generation, share in kept_apart(first).items()
+    ),
+    # k1 / k2: how many times the weight of unevenness that of the length is
+    "length_over_unevenness": lambda condition: (
+        condition.planner.objective.length_weight / condition.planner.objective.unevenness_weight
+    ),
+    # paths of fresh walks whose steps are uneven, and of redistributed ones whose steps are even
+    "uneven_walks": lambda condition: counted(
+        _unequal(condition, fresh(condition, redistributed=False), UNEVEN).ravel()
+    ),
+    "even_paths": lambda condition: counted(
+        ~_unequal(condition, fresh(condition, redistributed=True), EVEN).ravel()
+    ),
+    # runs in which a criterion of the best string fell, or is 0 at the end
+    "shorter": lambda condition: falls(condition, "length_arm_"),
+    "evener": lambda condition: falls(condition, "unevenness_arm_"),
+    "fewer_collisions": lambda condition: falls(condition, "collisions"),
+    # motions whose bodies never come closer than the safety distance, exactly
+    "with_margin": lambda condition: Proportion(
+        condition.verdicts.with_margin, condition.verdicts.judged
     ),
 }

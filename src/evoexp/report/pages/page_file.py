@@ -159,7 +159,7 @@ FILE, RULES_FILE = "page.yaml", "claims.yaml"
 _CLAIM = {"each", "when", "claim", "of", "than", "values", "better", "word", "words", "family"}
 _CLAIM |= {"elsewhere", "unjudged", "n", "planned", "by", "evidence"}
 KEYS: dict[str, set[str]] = {
-    "file": {"name", "functions", "pages", "quantities", "tables", "checks", "figures"},
+    "file": {"name", "functions", "values", "pages", "quantities", "tables", "checks", "figures"},
     "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
     | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
     "claims": _CLAIM | {"judge"},
@@ -242,7 +242,8 @@ def read_page_file(package: str, file: str = FILE) -> PageFile:
     modules = [
         importlib.import_module(f"{package}.{name}") for name in entries.get("functions", ())
     ]
-    functions = Functions({})
+    constants = entries.get("values", {}).items()
+    functions = Functions({name: lambda value=value: value for name, value in constants})
     for module in (page_values, run_measures, *modules):
         functions |= {  # also those that it makes of others
             name: each

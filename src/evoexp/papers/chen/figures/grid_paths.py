@@ -106,7 +106,6 @@ def draw_obstacle(axes: Axes, x: pd.Series, y: pd.Series) -> None:
 
 
 def _lines(panels: list[Axes], table: pd.DataFrame) -> Iterator[tuple[Axes, str, pd.DataFrame]]:
-    """Yield the rows of every path, with its axes and its kind."""
     for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
             yield axes, str(kind), line
@@ -314,7 +313,6 @@ def best_known(group: Group) -> dict[str, object]:
 
 
 def _median_run(condition: ConditionResults) -> PlayedRun:
-    """Return the run of median cost."""
     return PlayedRun(condition, path_claims.median_replicate(condition))
 
 

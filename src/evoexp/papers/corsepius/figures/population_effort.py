@@ -136,7 +136,6 @@ def logarithmic_axis(axes: Axes, values: Collection[float]) -> None:
 
 
 def _look(position: int) -> dict[str, Any]:
-    """Return colour, line and marker of a task's series."""
     return {
         "color": style.condition_colour(position),
         "linestyle": (0, (4, 1.5)) if position % 2 else "-",

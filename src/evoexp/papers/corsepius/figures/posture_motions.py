@@ -1,6 +1,6 @@
 """Paths of postures in space, local search scope (Corsépius 2001, Fig. 2), a local minimum."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
-from evoexp.papers.corsepius.measures import Conditions
+from evoexp.papers.corsepius.measures import Conditions, ShownPath
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
@@ -41,15 +41,6 @@ BOXES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 SAMPLES = 20_000  # postures in each box
 STUCK, HELPED = "stuck", "helped"
 END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
-
-
-class ShownPath(NamedTuple):
-    """The run of one panel, or of one panel per phase."""
-
-    title: str  # title of the panel
-    condition: ConditionResults  # the condition of the run
-    replicate: int  # its replicate
-    by_phase: bool = False  # whether each phase has a panel of its own
 
 
 def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
@@ -208,7 +199,6 @@ def draw_scope(table: pd.DataFrame) -> Figure:
 
 
 def _draw_ends(axes: Axes, path: pd.DataFrame) -> None:
-    """Draw the start and the end of a path."""
     look: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
     axes.plot(path["x"].iloc[:1], path["y"].iloc[:1], "s", markersize=6, label="start", **look)
     axes.plot(path["x"].iloc[-1:], path["y"].iloc[-1:], "*", markersize=9, label="end", **look)
@@ -327,7 +317,6 @@ def draw_trap(table: pd.DataFrame) -> Figure:
 
 
 def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
-    """Draw the cost over two joints, the stuck posture and its scope."""
     wide = cells.pivot(index="y", columns="x", values="value")
     look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
     shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)

@@ -1,4 +1,4 @@
-"""The pages on Curkovic et al. 2013: what they hold, and the tables behind their figures."""
+"""The pages on Curkovic et al. 2013: their figures, executed motions and their defects."""
 
 import dataclasses
 from pathlib import Path
@@ -7,18 +7,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from evoexp.condition import Prepared
 from evoexp.configuration import compose
-from evoexp.papers.curkovic import compared_settings, measures
+from evoexp.papers.curkovic import claims, measures
 from evoexp.papers.curkovic.figures import (
-    motion_curves,
-    pareto_fronts,
+    methods,
     robot_motions,
 )
+from evoexp.planners.proofs import judge_motion
+from evoexp.records import FloatArray
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Page
+from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics import judging
-from report_samples import can_be_drawn, page_settings, smoke_results
+from references.link_crossings_numpy import squared_distance
+from report_samples import can_be_drawn, expand, page_settings, smoke_results
 
 
 def page(outputs: Path, name: str, figures: str | None = None) -> Page:
@@ -43,14 +47,14 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
     table = drawing(page(outputs, "curkovic_pareto"), "fig_5_fronts")
     assert len(table) == 2 * 100
     for _, rows in table.groupby("population"):
-        values = rows[list(pareto_fronts.CRITERIA)].to_numpy()
+        values = rows[list(methods.CRITERIA)].to_numpy()
         no_worse, better = values[:, None] <= values, values[:, None] < values
         dominated = (no_worse.all(axis=2) & better.any(axis=2)).any(axis=0)
         assert list(~dominated) == list(rows["non_dominated"])
 
 
 def test_the_intersection_lies_on_both_vectors(motion: ConditionResults) -> None:
-    table = motion_curves.intersection_table(motion).set_index("element")
+    table = robot_motions.intersection_table(motion).set_index("element")
     start, end = table[["x", "y"]].astype(float), table[["x_end", "y_end"]].to_numpy(float)
     ends = pd.DataFrame(end, table.index, ["x", "y"])
     for vector, name in (("b", "mu"), ("d", "nu")):
@@ -98,7 +102,7 @@ def test_other_scenes_are_drawn_and_claimed(
     series = dict(list(distances.groupby("series")))
     lowest, best, highest = (
         series[each].set_index("position")["distance"]
-        for each in (motion_curves.LOWEST, motion_curves.BEST, motion_curves.HIGHEST)
+        for each in (robot_motions.LOWEST, robot_motions.BEST, robot_motions.HIGHEST)
     )
     assert (lowest <= best).all() and (best <= highest).all()
     for position, condition in enumerate(smoke_results(outputs, name).conditions):
@@ -137,21 +141,21 @@ def test_a_refuted_run_counts_as_worse_than_any(motion: ConditionResults) -> Non
     assert measures.exemplar(some) == 2  # the cheapest one that is not refuted
     none = changed(motion, costs, np.array([True] * 3))
     assert measures.exemplar(none) == 1
-    assert np.isnan(compared_settings.not_refuted(none)).all()
+    assert np.isnan(claims.not_refuted(none)).all()
 
 
 def test_shares_of_a_gain_are_what_medians_say(motion: ConditionResults) -> None:
     rng, false = np.random.default_rng(0), np.zeros(40, dtype=bool)
     costs = [level + 0.1 * rng.random(40) for level in (10.0, 9.0, 8.0)]
     nothing, elites, hall = (changed(motion, each, false) for each in costs)
-    gain, settings = compared_settings.gains(9.0)[0], page_settings("curkovic_hall")
-    found = compared_settings.share(gain, (nothing, elites, hall), settings)
+    gain, settings = claims.gains(9.0)[0], page_settings("curkovic_hall")
+    found = claims.share(gain, (nothing, elites, hall), settings)
     none, some, most = map(np.median, costs)
     assert found.value == pytest.approx((none - some) / (none - most))
     assert found.interval.low < found.value < found.interval.high < found.interval.low + 0.1
     assert found.n == (40, 40, 40)
     # a hall that gains nothing leaves no share
-    nobody = compared_settings.share(gain, (hall, elites, nothing), settings)
+    nobody = claims.share(gain, (hall, elites, nothing), settings)
     assert np.isnan([nobody.value, *nobody.interval]).all()
 
 
@@ -164,7 +168,7 @@ def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None
 
 def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
-    one, two = compared_settings.families(results)
+    one, two = claims.families(results)
     rates = [f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")]
     assert [other.label for _, other in one.pairs] == rates
     assert {first.label for first, _ in two.pairs} == {"Eq. 10, symmetric"}
@@ -178,7 +182,7 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
     results = smoke_results(outputs, "curkovic_stationary")
     both = results._replace(conditions=results.conditions[::-1])  # whatever comes first
     for each in (results, both):
-        ((one, other),) = compared_settings.families(each)[0].pairs
+        ((one, other),) = claims.families(each)[0].pairs
         assert (one.label, other.label) == ("configurations only", "5 substeps")
     found = page(outputs, "curkovic_stationary", "curkovic_sweep")
     assert found.claims == ()
@@ -230,10 +234,79 @@ def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
     refuted, leaves, fast = measures.defects(condition)
     assert refuted == (condition.verdicts.solved_refuted, condition.solved)
     links = [
-        measures.sampled(measures.executed(condition.prepared, solution), 500).links
+        measures.sampled(condition.prepared, solution, 500).links
         for solution in condition.solutions.values()
     ]
     assert leaves.having == sum(q.min() < -1e-6 or q.max() > 180.0 + 1e-6 for q in links)
     assert fast.having == sum(times > 1.0 for times in measures.times_over_limit(condition))
     interval = refuted.interval(0.95)
     assert interval.low <= refuted.share <= interval.high
+
+
+def prepared(*words: str) -> Prepared:
+    experiment = expand("curkovic_methods_b", "ga.population_size=20", *words)
+    return experiment.conditions[0].condition.prepare()
+
+
+@pytest.fixture(scope="module", params=["linear", "cubic"])
+def one(request: pytest.FixtureRequest) -> Prepared:
+    return prepared(f"planner.interpolation={request.param}")
+
+
+@pytest.fixture(scope="module")
+def linear() -> Prepared:
+    return prepared("planner.interpolation=linear")
+
+
+@pytest.fixture(scope="module")
+def solution(one: Prepared) -> FloatArray:
+    genes = np.random.default_rng(3).uniform(0.0, 180.0, (2, 6, 2))
+    genes[:, 0], genes[:, -1] = np.degrees(one.problem.start), np.degrees(one.problem.goal)
+    return genes.ravel()
+
+
+@pytest.mark.examples(1)
+def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: FloatArray) -> None:
+    found = measures.sampled(one, solution, 10)
+    assert found.links.shape == found.speeds.shape == (51, 2, 2)
+    configurations = solution.reshape(2, 6, 2)
+    np.testing.assert_allclose(found.links[::10].transpose(1, 0, 2), configurations, atol=1e-9)
+    motion = one.planner.motion(one.problem, solution)
+    np.testing.assert_allclose(found.q[:, 13], np.degrees(motion.at(1.3)), atol=1e-9)
+
+
+@pytest.mark.examples(1)
+def test_speeds_are_differences_of_angles(one: Prepared, solution: FloatArray) -> None:
+    found = measures.sampled(one, solution, 2000)
+    off = np.abs(np.diff(found.links, axis=0) * 2000 - found.speeds[:-1]).max()
+    # a step of 1/2000 against accelerations of some speeds per instant
+    assert off < 0.002 * np.abs(found.speeds).max()
+    expected = (np.abs(found.speeds).max(axis=0) / measures.speed_limits(one)).max()
+    assert measures.over_limit(one, solution) == pytest.approx(expected, rel=1e-4)
+
+
+def test_limits_are_those_of_equation_2(linear: Prepared) -> None:
+    limits = np.degrees([[0.1, 0.2]] * 2)
+    np.testing.assert_allclose(measures.speed_limits(linear), limits)
+    steps = np.abs(np.degrees(linear.problem.goal - linear.problem.start)) / 5.0
+    line = measures.straight(linear)
+    assert measures.over_limit(linear, line) == pytest.approx((steps / limits).max())
+
+
+@pytest.mark.matrix
+def test_a_control_has_the_limits_of_the_planner_beside_it(linear: Prepared) -> None:
+    control = measures.speed_limits(prepared("control=random_search"))
+    np.testing.assert_array_equal(control, measures.speed_limits(linear))
+
+
+def test_a_contact_lies_on_both_bodies(linear: Prepared) -> None:
+    planner, problem = linear
+    line = measures.straight(linear)
+    motion = planner.motion(problem, line)
+    found = judge_motion(planner, problem, motion)
+    assert found.certified is False and found.refuted_at is not None
+    point = motion_geometry.contact(linear, line, found.refuted_at, found.refuted_pair)
+    q = np.degrees(motion.at(found.refuted_at))[:, None]
+    for arm, link, starts, ends in motion_geometry.joint_positions(problem.assembly, q):
+        if f"arm_{arm + 1}_link_{link + 1}" in found.refuted_pair.split(" – "):
+            assert squared_distance(starts[0, :2], ends[0, :2], np.array(point)) < 1e-12

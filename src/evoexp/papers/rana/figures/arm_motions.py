@@ -1,4 +1,4 @@
-"""Motions of planar arms: snapshots, paths in configuration space, distances between the arms."""
+"""Motions of arms: snapshots, paths in configuration and operational space, distances."""
 
 from collections.abc import Callable
 from functools import partial
@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
 from evoexp.papers.rana import measures
-from evoexp.papers.rana.figures.planar_models import path_table
+from evoexp.papers.rana.figures.arm_models import links_table, path_table
 from evoexp.papers.rana.measures import STRAIGHT, TO_OBSTACLES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
@@ -55,6 +55,12 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     return rounded(found.reset_index(drop=True)).assign(length_unit=condition.length_unit)
 
 
+def spatial_snapshots_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return all links at every instant of the best replicate's motion, stage by stage."""
+    links = links_table(condition, measures.best_motion(condition))
+    return motion_geometry.in_stages(links, STAGES)
+
+
 def draw_snapshots(table: pd.DataFrame) -> Figure:
     """Draw the motion stage by stage, older instants fainter, and all of it in the last panel."""
     obstacles, moving = table[table["stage"] < 0], table[table["stage"] >= 0]
@@ -82,6 +88,26 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
 def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line, in configuration space."""
     return tables_of_paths(condition, path_table, "best")
+
+
+def spatial_paths_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return the paths of all replicates and the straight line in both spaces."""
+    table = rounded(tables_of_paths(condition, _path, "best replicate"))
+    return table.assign(length_unit=condition.length_unit)
+
+
+def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
+    problem = condition.problem(Problem)
+    q = motion_geometry.configurations(condition.prepared, solution)
+    places = motion_geometry.joint_positions(problem.assembly, q)
+    tips = {arm: end for arm, _, _, end in places}  # the last link's end stays
+    frames = []
+    for arm, (first, stop) in enumerate(problem.arm_slices):
+        columns: dict[str, Any] = {"arm": arm, "instant": np.arange(q.shape[1])}
+        columns |= dict(zip("xyz", tips[arm].T, strict=True))
+        columns |= {f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)}
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)
 
 
 def tables_of_paths(

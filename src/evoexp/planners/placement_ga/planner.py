@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.operators.breeding import ScaledGenetic
+from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.evolution.succession import choose_parents, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE, log

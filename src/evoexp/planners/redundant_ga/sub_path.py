@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 import numpy as np
 from pydantic import Field
 
-from evoexp.evolution.operators.breeding import Operators, PopulationSettings
 from evoexp.evolution.operators.crossover import (
     ArithmeticCrossover,
     BlxAlpha,
@@ -22,7 +21,15 @@ from evoexp.evolution.operators.mutation import (
     NonUniformMutation,
     UniformReset,
 )
-from evoexp.evolution.operators.operator import Crossover, Genome, Mutation, Named, Selection
+from evoexp.evolution.operators.operator import (
+    Crossover,
+    Genome,
+    Mutation,
+    Named,
+    Operators,
+    PopulationSettings,
+    Selection,
+)
 from evoexp.evolution.operators.selection import InverseRoulette, LinearRanking, Tournament
 from evoexp.evolution.succession import summarise
 from evoexp.numeric.generator_state import state_bytes

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
-from evoexp.evolution.operators.breeding import GeneticSettings, Operators
+from evoexp.evolution.operators.operator import GeneticSettings, Operators
 from evoexp.evolution.operators.selection import FitnessRoulette
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringFitness

@@ -13,8 +13,7 @@ from evoexp.collision.bodies.body_tables import FlatTables
 from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.operators.operator import Breeding, Cross, Genome, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE

@@ -12,8 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError, nearest
-from evoexp.numeric.elementary import exp, standard_normal
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import exp, matrix_product, standard_normal
 from evoexp.planners.planner import (
     COPIES,
     Populations,

@@ -13,8 +13,7 @@ import pinocchio as pin
 from evoexp.collision.bodies.body_models import BodyModel, Carried
 from evoexp.collision.covers.body_covers import Cover
 from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
-from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.ordered_sums import rotation_matrix
+from evoexp.numeric.elementary import DEGREE, rotation_matrix
 from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim, PostureCost
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import COST, ROWS, Judging

@@ -9,18 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 import numpy as np
 from pydantic import Field
 
-from evoexp.evolution.operators.crossover import (
-    ArithmeticCrossover,
-    BlxAlpha,
-    OnePoint,
-    UniformCrossover,
-)
-from evoexp.evolution.operators.mutation import (
-    BitFlips,
-    GaussianMutation,
-    NonUniformMutation,
-    UniformReset,
-)
+from evoexp.evolution.operators import crossover, mutation
 from evoexp.evolution.operators.operator import (
     Crossover,
     Genome,
@@ -97,18 +86,20 @@ class RealGenetic(SelectiveSettings):
         """The operators of a search."""
         one_gene = self.mutation_scope == "individual"
         named: dict[Any, Any] = {
-            "one_point": OnePoint(),
-            "uniform": UniformCrossover(),
-            "arithmetic": ArithmeticCrossover(),
-            "blx_alpha": BlxAlpha(blend_alpha=self.blend_alpha),
-            "non_uniform": NonUniformMutation(
+            "one_point": crossover.OnePoint(),
+            "uniform": crossover.UniformCrossover(),
+            "arithmetic": crossover.ArithmeticCrossover(),
+            "blx_alpha": crossover.BlxAlpha(blend_alpha=self.blend_alpha),
+            "non_uniform": mutation.NonUniformMutation(
                 one_gene=one_gene, mutation_power=self.mutation_power
             ),
-            "gaussian": GaussianMutation(one_gene=one_gene, mutation_std=self.mutation_std),
-            "uniform_reset": UniformReset(one_gene=one_gene),
+            "gaussian": mutation.GaussianMutation(
+                one_gene=one_gene, mutation_std=self.mutation_std
+            ),
+            "uniform_reset": mutation.UniformReset(one_gene=one_gene),
         }
-        crossover, mutation = (named.get(own, own) for own in (self.crossover, self.mutation))
-        return Operators(self.selection_operator, crossover, mutation)
+        chosen = (named.get(own, own) for own in (self.crossover, self.mutation))
+        return Operators(self.selection_operator, *chosen)
 
 
 class BinaryGenetic(SelectiveSettings):
@@ -125,7 +116,7 @@ class BinaryGenetic(SelectiveSettings):
     @property
     def operators(self) -> Operators:
         """The operators of a search."""
-        return Operators(self.selection_operator, OnePoint(), BitFlips())
+        return Operators(self.selection_operator, crossover.OnePoint(), mutation.BitFlips())
 
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.operators.operator import GeneticSettings, Operators
 from evoexp.evolution.operators.selection import FitnessRoulette
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringFitness
+from evoexp.objectives.motion_criteria import StringFitness
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem

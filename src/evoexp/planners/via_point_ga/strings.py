@@ -17,7 +17,7 @@ from evoexp.evolution.operators.operator import Breeding, Cross, Genome, Mutate,
 from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
+from evoexp.objectives.motion_criteria import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.redistribution import measure_paths, redistribute_arms, relax_points
 from evoexp.planners.answers import JudgementArrays

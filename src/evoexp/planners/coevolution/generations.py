@@ -16,10 +16,10 @@ from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.evolution.teams import BestTeam, Hall, HallRules, best_team
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
+from evoexp.planners.answers import Proofs
 from evoexp.planners.coevolution import kernels
 from evoexp.planners.driver import TableSearch
 from evoexp.planners.planner import Candidate
-from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
 from evoexp.validation import Count, Positive, Rate
 

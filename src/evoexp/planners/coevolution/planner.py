@@ -24,11 +24,10 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
-from evoexp.planners.answers import in_shape, of_limits, of_place
+from evoexp.planners.answers import Acceptance, in_shape, of_limits, of_place
 from evoexp.planners.coevolution import kernels
 from evoexp.planners.coevolution.generations import CoevolutionSettings, ProvenTeams, TeamSearch
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
-from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.motion_tasks import LinkMotion

@@ -23,11 +23,11 @@ from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.paths import grids
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import Acceptance
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
-from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
 from evoexp.robots.mobile_robots import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion

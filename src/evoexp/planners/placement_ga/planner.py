@@ -35,10 +35,9 @@ from evoexp.objectives.placement_criteria import (
     measure_postures,
 )
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape, of_limits
+from evoexp.planners.answers import Acceptance, in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
-from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_robots import MobileArm

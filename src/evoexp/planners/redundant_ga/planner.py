@@ -23,7 +23,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape, of_postures
+from evoexp.planners.answers import Acceptance, Proofs, in_shape, of_postures
 from evoexp.planners.planner import (
     COPIES,
     JudgementArrays,
@@ -31,7 +31,6 @@ from evoexp.planners.planner import (
     WrappedPlanner,
     num_values,
 )
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.redundant_ga import kernels, sub_path
 from evoexp.planners.redundant_ga.kernels import Judging, judge_paths

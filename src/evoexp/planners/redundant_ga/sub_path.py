@@ -23,9 +23,9 @@ from evoexp.evolution.operators.selection import InverseRoulette, LinearRanking,
 from evoexp.evolution.succession import summarise
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
+from evoexp.planners.answers import Proofs
 from evoexp.planners.driver import GeneticSearch, generations_per_call
 from evoexp.planners.planner import Candidate
-from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, SubPath

@@ -14,10 +14,9 @@ import numpy as np
 from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.answers import of_postures
+from evoexp.planners.answers import Acceptance, Proofs, of_postures
 from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.planner import Candidate, JudgementArrays
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.sampling_based import node_paths
 from evoexp.planners.sampling_based.kernels import distance

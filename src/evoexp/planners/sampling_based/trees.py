@@ -10,7 +10,7 @@ import numpy as np
 
 from evoexp.collision.bodies.covered_bodies import ArmCollision
 from evoexp.collision.planar.link_ellipses import EllipseCollision
-from evoexp.planners.proofs import Proofs
+from evoexp.planners.answers import Proofs
 from evoexp.planners.sampling_based import kernels
 from evoexp.records import FloatArray
 

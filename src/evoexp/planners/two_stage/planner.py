@@ -17,12 +17,12 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import Acceptance, Proofs
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import PlannerDefaults
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Best, Block, FloatArray
 from evoexp.robots.mobile_robots import ARM_JOINTS, FloorManipulator
 from evoexp.scenarios.motion_tasks import Mission

@@ -20,11 +20,10 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.redistribution import measure_paths, redistribute_arms, relax_points
-from evoexp.planners.answers import JudgementArrays
+from evoexp.planners.answers import JudgementArrays, Proofs
 from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.driver import GeneticSearch, generations_per_call
 from evoexp.planners.planner import Candidate
-from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.string_operators import num_uniforms, walk_strings
 from evoexp.records import Best, FloatArray, IntArray
 

@@ -36,7 +36,6 @@ class Mesh(Settings):
 
 
 def _pairs(value: Any) -> Any:
-    """Turn a mapping of names to values into pairs in the order of the names."""
     return tuple(sorted(value.items())) if isinstance(value, dict) else value
 
 

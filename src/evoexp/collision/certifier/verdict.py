@@ -142,7 +142,6 @@ class _Judgement:
         )
 
     def _too_close(self) -> bool:
-        """Return whether the closest pair comes closer than its own margin."""
         pair = self.best.pair
         return pair >= 0 and bool(self.best.distance < self.margins[pair] - self.tolerances[pair])
 

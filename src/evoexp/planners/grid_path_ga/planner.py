@@ -204,8 +204,6 @@ class GridPathGa(PlannerDefaults, Component):
 
 
 class _Search(kernels.PathTable, ScaledSearch):
-    """One run, and memory for its kernels."""
-
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
         ScaledSearch.__init__(self, ga, PER_CALL, BLOCK)

@@ -301,8 +301,6 @@ class PlacementGa(PlannerDefaults, Component):
 
 
 class _Search(ScaledSearch):
-    """One run, and memory for its kernels."""
-
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
         ga, size = planner.ga, planner.ga.population_size
         super().__init__(ga, PER_CALL, BLOCK)

@@ -260,7 +260,6 @@ class Problem:
 
     @property
     def _moving(self) -> list[int]:
-        """The bodies that a joint moves."""
         items = self.assembly.geometry.geometryObjects
         return [k for k, item in enumerate(items) if item.parentJoint > 0]
 

@@ -114,7 +114,6 @@ class _ConnectSearch:
                 self.best_cost, self._solution = path.length, path.nodes.flatten()
 
     def _is_done(self) -> bool:
-        """Whether the present start has come to its end."""
         if self._path is not None:
             return self._path.num_attempts >= self._planner.num_improvements
         return self.pair.num_iterations >= self._planner.max_iterations

@@ -119,7 +119,6 @@ class TreePair:
         return None
 
     def _branch(self, tree: int, index: int) -> FloatArray:
-        """Return the nodes from a tree's root to a node, (nodes, nq)."""
         branch = []
         while index >= 0:
             branch.append(index)

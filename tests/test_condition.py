@@ -296,7 +296,7 @@ def test_the_module_of_a_registration_holds_what_it_names(group: str) -> None:
 def guest(tmp_path: Path) -> Iterator[Callable[..., None]]:
     """Return what registers names of a guest's module, which is on the path."""
     (tmp_path / "guest_module.py").write_text(
-        "from evoexp.evolution.operators.breeding import GeneticSettings\n"
+        "from evoexp.evolution.operators.operator import GeneticSettings\n"
         "class Mine(GeneticSettings):\n    component = 'my_plug_in'\n"
     )
 

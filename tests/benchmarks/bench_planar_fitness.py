@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from evoexp.condition import Condition
-from evoexp.objectives.string_fitness import StringTerms
+from evoexp.objectives.motion_criteria import StringTerms
 from evoexp.planners.via_point_ga.strings import Strings, judge
 from evoexp.records import FloatArray, generations
 from evoexp.testing import conditions

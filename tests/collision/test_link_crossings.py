@@ -9,16 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coal_shapes import distance, placed
+from evoexp.collision.planar import planar_arms
 from evoexp.collision.planar.arm_pairs import count_collisions
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
-from evoexp.collision.planar.planar_arms import (
-    ROUNDING,
-    Arm,
-    closed_form,
-    meeting,
-    squared_distance,
-    tolerance_of,
-)
 from evoexp.errors import SettingError
 from evoexp.robots.arms import PlanarChain
 from matrix import first
@@ -26,8 +19,8 @@ from obstacle_samples import box, capsule, ellipse, half_space, sphere
 from references import arms_6r
 from references import link_crossings_numpy as plain
 
-SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))
-UNEQUAL = Arm((-0.2, 0.1), (0.4, 0.1)), Arm((0.3, -0.05), (0.15, 0.35))
+SCENE_A = planar_arms.Arm((0.0, 0.0), (0.25, 0.25)), planar_arms.Arm((0.3, 0.0), (0.25, 0.25))
+UNEQUAL = planar_arms.Arm((-0.2, 0.1), (0.4, 0.1)), planar_arms.Arm((0.3, -0.05), (0.15, 0.35))
 
 
 def outlines(arms: Any, rng: np.random.Generator, *counts: int, size: int = 3) -> Any:
@@ -45,7 +38,7 @@ def counts_of(arms: Any, drawn: Any) -> np.ndarray:
     return found.counts
 
 
-def boundaries(arm: Arm, outline: np.ndarray) -> np.ndarray:
+def boundaries(arm: planar_arms.Arm, outline: np.ndarray) -> np.ndarray:
     """Return the four boundary lines of all outlines, (4, 4, K, N)."""
     base = np.broadcast_to(np.reshape(arm.base, (2, 1, 1)), outline.transpose(1, 0, 2)[:2].shape)
     elbow, tip, *turns = outline[:, :8].transpose(1, 0, 2).reshape(4, 2, *base.shape[1:])
@@ -62,7 +55,7 @@ def boundaries(arm: Arm, outline: np.ndarray) -> np.ndarray:
 
 def touch(arms: Any, points: Any, i: int, j: int, k: int) -> bool:
     """Whether two arms touch, line by line and circle by circle."""
-    tolerance, lines, tips = tolerance_of(*arms), [], []
+    tolerance, lines, tips = planar_arms.tolerance_of(*arms), [], []
     for arm, outline, n in zip(arms, points, (i, j), strict=True):
         own = outline[k : k + 1, :, n : n + 1]
         if arm.half_width:
@@ -73,8 +66,8 @@ def touch(arms: Any, points: Any, i: int, j: int, k: int) -> bool:
     near = [(*tips[0], *tips[0]), *tips[1], arms[0].tcp_radius + arms[1].tcp_radius]
     circles = [near, *((line, *tips[1], arms[1].tcp_radius) for line in lines[0])]
     circles += [(line, *tips[0], arms[0].tcp_radius) for line in lines[1]]
-    return any(meeting(a, b, tolerance) for a in lines[0] for b in lines[1]) or any(
-        radius > 0.0 and squared_distance(line, x, y) <= (radius + tolerance) ** 2
+    return any(planar_arms.meeting(a, b, tolerance) for a in lines[0] for b in lines[1]) or any(
+        radius > 0.0 and planar_arms.squared_distance(line, x, y) <= (radius + tolerance) ** 2
         for line, x, y, radius in circles
     )
 
@@ -99,7 +92,7 @@ def test_counts_are_numpy_s(arms: Any, num_1: int, num_2: int) -> None:
     [(0.02, 0.05, 0.02, 0.05), (0.03, 0.0, 0.0, 0.2), (0.0, 0.1, 0.05, 0.0), (0.2, 0.3, 0.1, 0.4)],
 )
 def test_counts_of_envelopes_are_numpy_s(arms: Any, sizes: Any) -> None:
-    enveloped = Arm(*arms[0][:2], *sizes[:2]), Arm(*arms[1][:2], *sizes[2:])
+    enveloped = planar_arms.Arm(*arms[0][:2], *sizes[:2]), planar_arms.Arm(*arms[1][:2], *sizes[2:])
     drawn, parts = outlines(enveloped, np.random.default_rng(3), 100, 61), []
     for arm, outline in zip(enveloped, drawn, strict=True):
         parts += [boundaries(arm, outline), outline[:, 2:4], arm.tcp_radius]
@@ -127,15 +120,15 @@ def touching_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any
     return [(0.0, 0.0), (scale, 0.0)], grid * scale
 
 
-def longest_arm(base: Any, points: Any) -> Arm:
+def longest_arm(base: Any, points: Any) -> planar_arms.Arm:
     """Return an arm whose links are no shorter than those of any individual."""
     steps = points[:, :2] - np.array(base)[:, None], points[:, 2:] - points[:, :2]
     lengths = (float(np.hypot(*np.moveaxis(step, 1, 0)).max()) for step in steps)
-    return Arm((float(base[0]), float(base[1])), tuple(lengths))
+    return planar_arms.Arm((float(base[0]), float(base[1])), tuple(lengths))
 
 
 def almost_touching_envelopes(rng: np.random.Generator) -> tuple[Any, Any]:
-    arms = [Arm((x, 0.0), (0.5, 0.5), 0.125, 0.25) for x in (0.0, 0.75)]
+    arms = [planar_arms.Arm((x, 0.0), (0.5, 0.5), 0.125, 0.25) for x in (0.0, 0.75)]
     angles = rng.integers(0, 5, (2, 3, 2, 80)) * (np.pi / 4.0)
     angles += rng.uniform(-1.0, 1.0, angles.shape) * 10.0 ** rng.uniform(-9.0, -5.0, angles.shape)
     return arms, [arm.outlines(q) for arm, q in zip(arms, angles, strict=True)]
@@ -171,10 +164,10 @@ POINTS = st.tuples(COORDINATES, COORDINATES)
 
 def check_meeting(a: Any, b: Any, c: Any, d: Any) -> None:
     """Compare with rational arithmetic: what touches meets, what is apart does not."""
-    tolerance = ROUNDING * max(abs(x) for x in (*a, *b, *c, *d))
+    tolerance = planar_arms.ROUNDING * max(abs(x) for x in (*a, *b, *c, *d))
     square = plain.exact_squared_distance(a, b, c, d)
     if square == 0 or square > 4 * plain.Fraction(tolerance) ** 2:
-        assert meeting((*a, *b), (*c, *d), tolerance) == (square == 0)
+        assert planar_arms.meeting((*a, *b), (*c, *d), tolerance) == (square == 0)
 
 
 @given(
@@ -197,7 +190,7 @@ def test_the_closed_form_decides_the_same(arms: Any) -> None:
     q_1, q_2 = rng.uniform(0.0, np.pi, (2, 2, size))
     q_2[:, : size // 10] = q_1[:, : size // 10]  # parallel links
     q_2[:, size // 10 : size // 5] = q_1[::-1, size // 10 : size // 5]
-    found = closed_form(arms[0], q_1, arms[1], q_2)
+    found = planar_arms.closed_form(arms[0], q_1, arms[1], q_2)
     one, two = (
         [np.array(arm.base)[:, None], *arm.outlines(q[None])[0, :4].reshape(2, 2, -1)]
         for arm, q in zip(arms, (q_1, q_2), strict=True)
@@ -242,7 +235,7 @@ def test_shapes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="at most 32767 configurations, were 32768"):
         counts_of(SCENE_A, [np.zeros((32768, 4, 1))] * 2)
     with pytest.raises(ValueError, match=r"both have shape \(2, n\), were \(2, 3\) and \(2, 4\)"):
-        closed_form(one, np.zeros((2, 3)), two, np.zeros((2, 4)))
+        planar_arms.closed_form(one, np.zeros((2, 3)), two, np.zeros((2, 4)))
 
 
 @pytest.mark.parametrize("scale", [2.0**-300, 1e-3, 1.0, 7e5, 2.0**200])
@@ -253,15 +246,15 @@ def test_blocks_that_an_axis_seems_to_separate(scale: float, turn: int, offset: 
     along = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)][turn])
     across, base = np.array([-along[1], along[0]]), np.full(2, offset * scale)
 
-    def arm(start: Any) -> Arm:
-        return Arm((float(start[0]), float(start[1])), (0.4 * scale, 0.4 * scale))
+    def arm(start: Any) -> planar_arms.Arm:
+        return planar_arms.Arm((float(start[0]), float(start[1])), (0.4 * scale, 0.4 * scale))
 
     def equal(*points: Any) -> np.ndarray:  # a block of eight individuals, and one more
         return np.repeat(np.concatenate(points)[np.newaxis, :, np.newaxis], 9, axis=2)
 
     tip, one = base + 0.5 * scale * along, arm(base)
     for gap in (0.0, 4.0):
-        centre = tip + gap * tolerance_of(one, one) * along
+        centre = tip + gap * planar_arms.tolerance_of(one, one) * along
         below, above = centre - 0.25 * scale * across, centre + 0.25 * scale * across
         drawn = [equal(base + 0.25 * scale * along, tip), equal(centre, above)]
         expected = np.full((9, 9), not gap)
@@ -269,7 +262,7 @@ def test_blocks_that_an_axis_seems_to_separate(scale: float, turn: int, offset: 
         assert np.array_equal(counts_of((arm(below), one), drawn[::-1]), expected)
 
 
-ARM = Arm((0.1, -0.05), (0.3, 0.2))
+ARM = planar_arms.Arm((0.1, -0.05), (0.3, 0.2))
 OBSTACLES: dict[str, Any] = {
     "disc": sphere((0.3, 0.2), 0.08),
     "box": box((0.2, 0.3), (0.2, 0.05), (0.0, 0.0, 35.0)),
@@ -279,7 +272,7 @@ OBSTACLES: dict[str, Any] = {
 }
 
 
-def bound(arm: Arm, *obstacles: Any) -> LinkCollision:
+def bound(arm: planar_arms.Arm, *obstacles: Any) -> LinkCollision:
     """Return the collision model of one arm among obstacles."""
     robot = PlanarChain(link_lengths=arm.lengths, base_position=arm.base)
     model = LinkCrossings(
@@ -295,7 +288,7 @@ def rod(ends: Any) -> Any:
 
 @pytest.mark.parametrize("arm", [ARM, ARM._replace(half_width=0.03, tcp_radius=0.07)])
 @pytest.mark.parametrize("names", [*([name] for name in OBSTACLES), list(OBSTACLES)], ids=" ".join)
-def test_counts_are_coal_s(names: Any, arm: Arm) -> None:
+def test_counts_are_coal_s(names: Any, arm: planar_arms.Arm) -> None:
     obstacles = [OBSTACLES[name] for name in names]
     solids = [placed(*arms_6r.coal_obstacle(each)) for each in obstacles]
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (4, 2, 60))

@@ -17,7 +17,7 @@ from evoexp.commands.motion_files import flatten, nested, read_motion
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import find
 from evoexp.errors import SettingError
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.records import generations
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory

@@ -17,7 +17,7 @@ from evoexp.commands.list_ import EXPERIMENT_KEYS, RUN_KEYS
 from evoexp.commands.show import INDENT, KEYS, MAX_LINES, screen
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import description, options
-from evoexp.evolution.operators.breeding import GeneticSettings
+from evoexp.evolution.operators.operator import GeneticSettings
 from evoexp.shipped import Shipped
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from command_samples import SERIAL, Evoexp
 
-from evoexp.evolution.operators.breeding import GeneticSettings
+from evoexp.evolution.operators.operator import GeneticSettings
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from forged_logs import with_attachment

@@ -6,41 +6,34 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp import testing as drawn
+from evoexp.evolution.operators import selection
 from evoexp.evolution.operators.operator import Selection
-from evoexp.evolution.operators.selection import (
-    DifferenceRoulette,
-    FitnessRoulette,
-    InverseRoulette,
-    LinearRanking,
-    Tournament,
-    spin_roulette,
-)
 from evoexp.evolution.succession import scale_costs
 
 INF, NAN = np.inf, np.nan
 COUNT = 40_000
-FITNESS = FitnessRoulette(fitness_offset=4.0)
+FITNESS = selection.FitnessRoulette(fitness_offset=4.0)
 
 
 @pytest.mark.parametrize(
     ("operator", "costs", "weights"),
     [
-        (InverseRoulette(), [1.0, 4.0, 0.5, INF], [1.0, 0.25, 2.0, 0.0]),
-        (InverseRoulette(), [3.0, 0.0, 1.0, -0.0, INF], [0.0, 1.0, 0.0, 1.0, 0.0]),
-        (InverseRoulette(), [1.0, NAN], [1.0, 0.0]),
-        (InverseRoulette(), [INF, INF], [1.0, 1.0]),  # nobody weighs anything
-        (DifferenceRoulette(), [1.0, 4.0, 2.5, INF], [3.0, 0.0, 1.5, 0.0]),
-        (DifferenceRoulette(), [2.0, INF, 2.0, NAN], [1.0, 0.0, 1.0, 0.0]),
-        (DifferenceRoulette(), [INF, INF], [1.0, 1.0]),
+        (selection.InverseRoulette(), [1.0, 4.0, 0.5, INF], [1.0, 0.25, 2.0, 0.0]),
+        (selection.InverseRoulette(), [3.0, 0.0, 1.0, -0.0, INF], [0.0, 1.0, 0.0, 1.0, 0.0]),
+        (selection.InverseRoulette(), [1.0, NAN], [1.0, 0.0]),
+        (selection.InverseRoulette(), [INF, INF], [1.0, 1.0]),  # nobody weighs anything
+        (selection.DifferenceRoulette(), [1.0, 4.0, 2.5, INF], [3.0, 0.0, 1.5, 0.0]),
+        (selection.DifferenceRoulette(), [2.0, INF, 2.0, NAN], [1.0, 0.0, 1.0, 0.0]),
+        (selection.DifferenceRoulette(), [INF, INF], [1.0, 1.0]),
         (FITNESS, [1.0, 3.5, 4.0, 9.0], [3.0, 0.5, 0.0, 0.0]),
         (FITNESS, [5.0, 9.0], [1.0, 1.0]),
-        (Tournament(), [3.0, INF, 1.0, 2.0], [3.0, 1.0, 7.0, 5.0]),  # of 16 ordered draws
-        (Tournament(), [INF, INF, INF], [1.0, 1.0, 1.0]),
-        (Tournament(tournament_size=1), [3.0, INF, 1.0], [1.0, 1.0, 1.0]),
-        (LinearRanking(rank_pressure=1.0), [4.0, 3.0, 1.0, INF], [1.0, 1.0, 1.0, 1.0]),
-        (LinearRanking(rank_pressure=2.0), [4.0, 3.0, 1.0, 3.0], [0.0, 1.5, 3.0, 1.5]),
-        (LinearRanking(rank_pressure=1.5), [5.0, 1.0, INF, INF], [7.0, 9.0, 4.0, 4.0]),
-        (LinearRanking(rank_pressure=2.0), [7.0], [1.0]),
+        (selection.Tournament(), [3.0, INF, 1.0, 2.0], [3.0, 1.0, 7.0, 5.0]),  # of 16 ordered draws
+        (selection.Tournament(), [INF, INF, INF], [1.0, 1.0, 1.0]),
+        (selection.Tournament(tournament_size=1), [3.0, INF, 1.0], [1.0, 1.0, 1.0]),
+        (selection.LinearRanking(rank_pressure=1.0), [4.0, 3.0, 1.0, INF], [1.0, 1.0, 1.0, 1.0]),
+        (selection.LinearRanking(rank_pressure=2.0), [4.0, 3.0, 1.0, 3.0], [0.0, 1.5, 3.0, 1.5]),
+        (selection.LinearRanking(rank_pressure=1.5), [5.0, 1.0, INF, INF], [7.0, 9.0, 4.0, 4.0]),
+        (selection.LinearRanking(rank_pressure=2.0), [7.0], [1.0]),
     ],
 )
 def test_parents_are_drawn_by_their_weights(
@@ -58,7 +51,7 @@ def test_parents_are_drawn_by_their_weights(
 )
 def test_roulette_never_draws_a_weight_of_zero(weights: np.ndarray, seed: int) -> None:
     chosen = np.full(50, -1)
-    spin_roulette(weights, np.random.default_rng(seed).random(50), chosen)
+    selection.spin_roulette(weights, np.random.default_rng(seed).random(50), chosen)
     assert 0 <= chosen.min() <= chosen.max() < len(weights)
     assert (weights[chosen] > 0.0).all() or not weights.any()
 

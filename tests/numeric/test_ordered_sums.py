@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import evoexp
-from evoexp.numeric.ordered_sums import length, matrix_product
+from evoexp.numeric.elementary import length, matrix_product
 
 ROOMS = ("collision", "evolution", "numeric", "objectives", "paths", "planners", "robots")
 NAMES = ("dot", "einsum", "inner", "linalg", "matmul", "tensordot", "vdot")
@@ -58,5 +58,5 @@ def test_no_sum_between_seed_and_record_is_left_to_the_processor(room: str) -> N
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             is_named = isinstance(node, ast.Attribute) and ast.unparse(node) in BY_PROCESSOR
             assert not (isinstance(node, ast.MatMult) or is_named), (
-                f"{path}: `numeric.ordered_sums` has products and lengths"
+                f"{path}: `numeric.elementary` has products and lengths"
             )

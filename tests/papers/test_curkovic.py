@@ -14,7 +14,7 @@ from evoexp.papers.curkovic.figures import (
     methods,
     robot_motions,
 )
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.records import FloatArray
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Page

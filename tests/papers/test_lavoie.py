@@ -13,7 +13,7 @@ from evoexp.papers.lavoie import figures, measures
 from evoexp.papers.lavoie.figures import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.paths.motion import Motion
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.report.figures import side_by_side
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_file import read_page_file

@@ -9,17 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
-from evoexp.paths.grids import (
-    LANES,
-    UNREACHED,
-    WORDS,
-    Moves,
-    front,
-    grid,
-    walk,
-    walk_all,
-    weigh_all,
-)
+from evoexp.paths import grids
 from matrix import num_cases
 from references.chen_python import without_loops
 
@@ -48,7 +38,7 @@ def joined_laterally(blocked: np.ndarray, one: Node, two: Node) -> bool:
 @given(SHAPES, st.floats(0.0, 0.7), st.integers(0, 2**32))
 def test_moves_are_those_of_the_rule(shape: Node, share: float, seed: int) -> None:
     blocked = maps(shape, share, seed)
-    own = grid(blocked)
+    own = grids.grid(blocked)
     for node in itertools.product(*map(range, shape)):
         around = itertools.product(*(range(a - 1, a + 2) for a in node))
         targets = {
@@ -67,7 +57,7 @@ def test_moves_are_those_of_the_rule(shape: Node, share: float, seed: int) -> No
 
 def test_there_are_2m_lateral_moves_first() -> None:
     for shape, lateral, everything in (((3, 3), 4, 8), ((3, 3, 3), 6, 26)):
-        own = grid(np.zeros(shape, dtype=bool))
+        own = grids.grid(np.zeros(shape, dtype=bool))
         assert own.moves_within(1) == lateral
         assert own.moves_within(len(shape)) == everything == len(own.changes)
 
@@ -76,7 +66,7 @@ def test_there_are_2m_lateral_moves_first() -> None:
 def test_a_front_counts_steps(shape: Node, share: float, neighbourhood: int, seed: int) -> None:
     blocked = maps(shape, share, seed)
     blocked.flat[0] = False
-    own = grid(blocked)
+    own = grids.grid(blocked)
     source = own.index_of((0,) * len(shape))
     steps, queue = {source: 0}, deque([source])
     while queue:
@@ -85,8 +75,8 @@ def test_a_front_counts_steps(shape: Node, share: float, neighbourhood: int, see
             if other >= 0 and other not in steps:
                 steps[other] = steps[node] + 1
                 queue.append(other)
-    found = front(own, np.array([source]), neighbourhood)
-    assert {k: int(v) for k, v in enumerate(found) if v != UNREACHED} == steps
+    found = grids.front(own, np.array([source]), neighbourhood)
+    assert {k: int(v) for k, v in enumerate(found) if v != grids.UNREACHED} == steps
 
 
 SEEDS = st.integers(0, 2**32)
@@ -102,16 +92,16 @@ class World:
         height.flat[[0, -1]] = 1.0
         first, last = (0,) * len(shape), tuple(size - 1 for size in shape)
         while True:
-            self.grid = grid(height < share)
+            self.grid = grids.grid(height < share)
             self.ends = self.grid.index_of(first), self.grid.index_of(last)
-            steps = front(self.grid, np.array([self.ends[1]]), 1)
-            if steps[self.ends[0]] != UNREACHED:
+            steps = grids.front(self.grid, np.array([self.ends[1]]), 1)
+            if steps[self.ends[0]] != grids.UNREACHED:
                 break
             share *= 0.8
         nodes = range(self.grid.num_nodes)
         self.potentials = np.array([0.0, *(1.0 + step * k for k in nodes)])
-        self.moves = Moves(self.grid.neighbours, self.potentials, steps)
-        self.sums = weigh_all(self.moves).astype(np.uint16)
+        self.moves = grids.Moves(self.grid.neighbours, self.potentials, steps)
+        self.sums = grids.weigh_all(self.moves).astype(np.uint16)
 
     def step(self, node: int, uniform: float) -> int:
         """Draw a move by its weight (Chen & Zalzala 1995, section 2.3)."""
@@ -156,7 +146,7 @@ def test_a_table_of_weights_leads_to_the_same_nodes(
     walks = []
     for sums in (world.sums[None], world.sums[None][:0]):
         (path, place), draws = world.rows(2), Block(uniforms, np.array([3]))
-        walk(draws, world.moves, sums, world.ends, erase, path, place)
+        grids.walk(draws, world.moves, sums, world.ends, erase, path, place)
         walks.append((draws.taken[0], path[: path[0] + 1].tolist()))
     assert walks[0] == walks[1]
 
@@ -165,20 +155,20 @@ def test_numbers_that_do_not_suffice_are_said() -> None:
     world = World((9, 9), 0.0, 0, 2.0)
     for taken in (0, 5):
         (path, place), draws = world.rows(2), Block(np.full(5, 0.5), np.array([taken]))
-        walk(draws, world.moves, world.sums[None][:0], world.ends, True, path, place)
+        grids.walk(draws, world.moves, world.sums[None][:0], world.ends, True, path, place)
         assert used_up(draws)
 
 
 def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list[int]], int]:
     """Every walker takes half a word in turn; whoever arrives begins the next walk, if any."""
     halves = iter(half / 2**32 for word in words.tolist() for half in (word % 2**32, word // 2**32))
-    trails: list[list[int]] = [[world.ends[0]] for _ in range(max(count, LANES))]
-    own, begun, taken = list(range(LANES)), LANES, 0
+    trails: list[list[int]] = [[world.ends[0]] for _ in range(max(count, grids.LANES))]
+    own, begun, taken = list(range(grids.LANES)), grids.LANES, 0
     while any(trail[-1] != world.ends[1] for trail in trails[:count]) or begun < count:
-        taken += WORDS
-        for k in range(LANES):
+        taken += grids.WORDS
+        for k in range(grids.LANES):
             trails[own[k]].append(world.step(trails[own[k]][-1], next(halves)))
-        for k in range(LANES):
+        for k in range(grids.LANES):
             if trails[own[k]][-1] == world.ends[1]:
                 own[k], begun = begun, begun + 1
                 if own[k] >= len(trails):
@@ -188,14 +178,16 @@ def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list
 
 
 @settings(max_examples=num_cases(10, 60), deadline=None)
-@given(FLOORS, SHARES, st.sampled_from([1, 2]), st.booleans(), st.integers(1, 3 * LANES), SEEDS)
+@given(
+    FLOORS, SHARES, st.sampled_from([1, 2]), st.booleans(), st.integers(1, 3 * grids.LANES), SEEDS
+)
 def test_many_walks_are_those_of_walkers_that_take_turns(
     shape: tuple[int, ...], share: float, step: int, erase: bool, count: int, seed: int
 ) -> None:
     world, words = World(shape, share, seed, step), random_words(seed)
     paths = world.rows(count)
     own = world.grid.neighbours, world.sums, world.ends, erase
-    taken = walk_all(words, WORDS, WORDS, *own, paths)
+    taken = grids.walk_all(words, grids.WORDS, grids.WORDS, *own, paths)
     trails, expected = plain_trails(world, words, count)
     assert taken == expected
     for path, trail in zip(paths.tolist(), trails, strict=True):
@@ -209,10 +201,10 @@ def test_words_are_drawn_in_whole_portions_as_far_as_there_are_as_many(
 ) -> None:
     world, words = World(shape, 0.3, seed, 2.0), random_words(seed)
     own: Any = world.grid.neighbours, world.sums, world.ends, erase
-    one_by_one, portioned = world.rows(2 * LANES + 1), world.rows(2 * LANES + 1)
-    taken = walk_all(words, WORDS, WORDS, *own, one_by_one)
-    counts = WORDS * first, WORDS * more
-    drawn = walk_all(words, *counts, *own, portioned)
+    one_by_one, portioned = world.rows(2 * grids.LANES + 1), world.rows(2 * grids.LANES + 1)
+    taken = grids.walk_all(words, grids.WORDS, grids.WORDS, *own, one_by_one)
+    counts = grids.WORDS * first, grids.WORDS * more
+    drawn = grids.walk_all(words, *counts, *own, portioned)
     assert np.array_equal(one_by_one, portioned)
     assert drawn == counts[0] + counts[1] * max(0, -(-(taken - counts[0]) // counts[1]))
-    assert walk_all(words[: drawn - 1], *counts, *own, portioned) == -1
+    assert grids.walk_all(words[: drawn - 1], *counts, *own, portioned) == -1

@@ -6,7 +6,7 @@ import numpy as np
 
 from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
-from evoexp.evolution.operators.breeding import ScaledGenetic
+from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.planners.grid_path_ga.planner import GridPathGa, PathCost, Problem
 from evoexp.robots.mobile_robots import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion

@@ -6,7 +6,7 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import Certificate
 from evoexp.condition import Condition
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.records import generations
 
 

@@ -18,8 +18,8 @@ from evoexp.collision.scene import Part
 from evoexp.condition import Condition
 from evoexp.evolution.teams import best_team
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import Proofs
 from evoexp.planners.coevolution.generations import ProvenTeams
-from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.strings import settle
 from evoexp.store.log_reader import read_log
 from matrix import counts

@@ -11,7 +11,7 @@ from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.planners.via_point_ga.strings import Strings
 from evoexp.records import generations
 from moveit_samples import (

@@ -10,7 +10,7 @@ from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.planners.proofs import Proofs
+from evoexp.planners.answers import Proofs
 from evoexp.robots.mobile_robots import FloorManipulator
 from evoexp.store.log_reader import read_log
 from planners.runs import ran, verdict

@@ -8,7 +8,7 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa, sampled
 from evoexp.records import FloatArray, generations
 from planners.runs import evolved

@@ -5,7 +5,7 @@ import pytest
 
 from evoexp.collision.scene import Part, Scene, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.playback.contacts import clearance, remainder
 from evoexp.playback.recording import MAX_TICKS, Recording, outline, points, ticks
 from evoexp.playback.trajectory import SpeedLimits, seconds_per_instant, velocities

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.report.figures import effort_curves
 from evoexp.report.pages import comparison
 from evoexp.report.pages.comparison import Rated, as_csv

@@ -13,16 +13,8 @@ from coal_shapes import distance, distance_of_point, placed
 from evoexp.attachments import PREFIX, File, keep
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
+from evoexp.robots import meshes
 from evoexp.robots import meshes as module
-from evoexp.robots.meshes import (
-    load,
-    loaded_mesh,
-    mesh_pieces,
-    read_pieces,
-    triangles_of,
-    unused_vertices,
-    whole_mesh,
-)
 from evoexp.robots.urdf import Urdf
 from robots.robot_samples import task, urdf_of
 
@@ -67,16 +59,18 @@ def turned(corners: list[tuple[float, ...]]) -> tuple[tuple[float, ...], ...]:
 
 def built_triangles(mesh: Any) -> set[tuple[tuple[float, ...], ...]]:
     vertices = np.asarray(mesh.vertices())
-    return {turned([tuple(vertices[k].tolist()) for k in face]) for face in triangles_of(mesh)}
+    return {
+        turned([tuple(vertices[k].tolist()) for k in face]) for face in meshes.triangles_of(mesh)
+    }
 
 
 def test_triangles_of_several_materials_end_where_the_file_says() -> None:
     """coal's loader, and with it Pinocchio's, joins those of the second to the first's vertices."""
-    read_by_coal = load(MATERIALS, "a.obj", "")
-    assert unused_vertices(read_by_coal) == 3
+    read_by_coal = meshes.load(MATERIALS, "a.obj", "")
+    assert meshes.unused_vertices(read_by_coal) == 3
     assert built_triangles(read_by_coal) != obj_triangles(MATERIALS)
-    mended = load(whole_mesh(MATERIALS, "a.obj", "robot.path"), "a.obj", "")
-    assert unused_vertices(mended) == 0
+    mended = meshes.load(meshes.whole_mesh(MATERIALS, "a.obj", "robot.path"), "a.obj", "")
+    assert meshes.unused_vertices(mended) == 0
     assert built_triangles(mended) == obj_triangles(MATERIALS)
 
 
@@ -95,13 +89,13 @@ VARIANTS = {
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_files_of_objects_are_read_like_by_the_slow_reader(name: str) -> None:
-    mesh = load(whole_mesh(VARIANTS[name], "a.obj", "robot.path"), "a.obj", "")
+    mesh = meshes.load(meshes.whole_mesh(VARIANTS[name], "a.obj", "robot.path"), "a.obj", "")
     expected = obj_triangles(VARIANTS[name].replace(b"\\\n", b""))
     areas = [
         sum(np.linalg.norm(np.cross(np.subtract(b, a), np.subtract(c, a))) for a, b, c in triangles)
         for triangles in (built_triangles(mesh), expected)
     ]
-    assert unused_vertices(mesh) == 0 and areas[0] == pytest.approx(areas[1])
+    assert meshes.unused_vertices(mesh) == 0 and areas[0] == pytest.approx(areas[1])
 
 
 DAE = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"
@@ -189,8 +183,8 @@ def test_a_mesh_that_is_none_is_refused_with_the_reason(
     ],
 )
 def test_a_mesh_travels_as_it_is(name: str, content: bytes) -> None:
-    assert whole_mesh(content, name, "robot.path") is content
-    assert unused_vertices(load(content, name, "")) == 0
+    assert meshes.whole_mesh(content, name, "robot.path") is content
+    assert meshes.unused_vertices(meshes.load(content, name, "")) == 0
 
 
 def robot(folder: Path, name: str, scale: str = "", **settings: Any) -> Urdf:
@@ -254,7 +248,7 @@ def angle_iron() -> bytes:
 
 
 def surface_points(count: int) -> np.ndarray:
-    corners, triangles = loaded_mesh(angle_iron(), ".obj", "test")
+    corners, triangles = meshes.loaded_mesh(angle_iron(), ".obj", "test")
     rng = np.random.default_rng(2)
     a, b, c = corners[triangles].transpose(1, 0, 2)
     area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
@@ -264,7 +258,7 @@ def surface_points(count: int) -> np.ndarray:
 
 
 def pieces_of(content: bytes) -> list[coal.Convex]:
-    return read_pieces(content, np.ones(3), "test")
+    return meshes.read_pieces(content, np.ones(3), "test")
 
 
 def standing_out(pieces: list[coal.Convex], count: int) -> float:
@@ -275,7 +269,7 @@ def standing_out(pieces: list[coal.Convex], count: int) -> float:
 
 
 def test_the_hull_of_a_mesh_contains_it() -> None:
-    pieces = pieces_of(mesh_pieces(angle_iron(), ".obj", "hulls", "test"))
+    pieces = pieces_of(meshes.mesh_pieces(angle_iron(), ".obj", "hulls", "test"))
     assert len(pieces) == 1 and pieces[0].num_points == 5 * 2
     assert standing_out(pieces, 300) < 1e-6
 
@@ -283,7 +277,7 @@ def test_the_hull_of_a_mesh_contains_it() -> None:
 def test_pieces_of_coacd_contain_the_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("coacd")
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path))
-    content = mesh_pieces(angle_iron(), ".obj", "coacd", "test")
+    content = meshes.mesh_pieces(angle_iron(), ".obj", "coacd", "test")
     pieces = pieces_of(content)
     assert 2 <= len(pieces) <= 4
     assert standing_out(pieces, 1000) < 1e-6
@@ -292,12 +286,12 @@ def test_pieces_of_coacd_contain_the_mesh(tmp_path: Path, monkeypatch: pytest.Mo
     assert all(distance(notch, placed(piece)) > 0.05 for piece in pieces)
     # the second time they are read from the cache
     monkeypatch.setattr(module, "_grown", None)
-    assert mesh_pieces(angle_iron(), ".obj", "coacd", "test") == content
+    assert meshes.mesh_pieces(angle_iron(), ".obj", "coacd", "test") == content
 
 
 def test_pieces_that_leave_parts_out_are_grown() -> None:
     """Two boxes that are smaller than the arms of the L, as CoACD's remeshed pieces may be."""
-    corners, triangles = loaded_mesh(angle_iron(), ".obj", "test")
+    corners, triangles = meshes.loaded_mesh(angle_iron(), ".obj", "test")
     box = np.array(np.meshgrid((0.02, 0.98), (0.02, 0.98), (0.02, 0.98))).reshape(3, -1).T
     small = [box * [3.0, 1.0, 1.0], box * [1.0, 3.0, 1.0]]
     grown = module._grown(small, corners, triangles)

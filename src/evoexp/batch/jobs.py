@@ -136,7 +136,7 @@ def one_of_each_kind(jobs: Iterable[Job]) -> list[Job]:
 def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
     """Run every kernel that the conditions of jobs need; errors are left to the replicates."""
     from evoexp.paths.motion import Motion  # and numba
-    from evoexp.planners.proofs import judge_motion
+    from evoexp.planners.answers import judge_motion
 
     limits = limits._replace(timeout_s=max(limits.timeout_s or 0.0, COMPILING_S))
     for job in jobs:

@@ -9,7 +9,7 @@ from evoexp.attachments import SHA256
 from evoexp.collision.box_support import EXACT
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.records import Block, ReplicateSummary, blocks
 from evoexp.registry import guests
 from evoexp.store.log import Finished, Log

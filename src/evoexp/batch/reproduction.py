@@ -18,7 +18,7 @@ from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.batch.runner_settings import machine_memory, refuse_large
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, EvoexpError, MissingDistribution
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.records import TIMES, ReplicateSummary, flatten
 from evoexp.registry import missing
 from evoexp.store.files import reason

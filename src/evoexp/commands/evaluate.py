@@ -21,8 +21,7 @@ from evoexp.commands.motion_files import (
     stored_motion,
 )
 from evoexp.errors import MotionFileError
-from evoexp.planners.answers import Listing
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import Listing, judge_motion
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
 REMARKS = "remarks"  # of a row: how a trajectory was read

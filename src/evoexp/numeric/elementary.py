@@ -1,4 +1,4 @@
-"""Bit-reproducible elementary functions.
+"""Bit-reproducible elementary functions, and products, lengths and rotations of small arrays.
 
 The functions are scalar and meant to be called inside kernels: LLVM inlines them, and an innermost
 loop over an array becomes vector code. They use only `+ − × ÷ sqrt`, comparisons and the bits of
@@ -7,6 +7,9 @@ code, any vector width and any optimisation level give the same bits. `sincos` t
 (`numeric.vectors`), too. Integer and float32 arguments count as float64. Error bounds are
 the largest error measured against 80-bit arithmetic, rounded up; u = 1.11e-16 is half a unit in the
 last place of 1.
+
+numpy's `@`, `dot`, `linalg.norm` and `einsum` leave sums to code written for the processor, which
+fuses a product and a sum where it can, or adds in another order. Here terms are added one by one.
 
 Coefficients and exact-sum tricks: Sun's fdlibm 5.3 (k_sin.c, k_cos.c, s_atan.c, e_asin.c, e_log.c,
 e_exp.c; Copyright (C) 1993 by Sun Microsystems, Inc.: "Permission to use, copy, modify, and
@@ -22,6 +25,8 @@ from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import Number, from_bits, select, to_bits
+
+FloatArray = NDArray[np.float64]
 
 DEGREE = 0.017453292519943295  # [rad] one degree
 
@@ -338,3 +343,33 @@ def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> ND
     with rng.bit_generator.lock:
         fill_standard_normal(rng, out.reshape(-1))
     return out
+
+
+# ------------------------------------------------------------------------------------ small arrays
+
+
+def matrix_product(one: FloatArray, two: FloatArray) -> FloatArray:
+    """Return the matrix product of (…, k) and (k,) or (k, m)."""
+    columns = one if two.ndim == 1 else one[..., None]
+    axis = one.ndim - 1
+    total = columns.take(0, axis) * two[0]
+    for k in range(1, one.shape[-1]):
+        total = total + columns.take(k, axis) * two[k]
+    return np.asarray(total)
+
+
+def length(vector: FloatArray) -> float:
+    """Return the Euclidean length of a vector (k,)."""
+    return float(np.sqrt(matrix_product(vector, vector)))
+
+
+def rotation_matrix(angles: tuple[float, float, float]) -> FloatArray:
+    """Return the rotation of roll, pitch, yaw [deg]: Rz(yaw) Ry(pitch) Rx(roll), (3, 3)."""
+    (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

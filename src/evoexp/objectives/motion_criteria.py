@@ -1,15 +1,79 @@
-"""Criteria of a robot's motion in the plane, for whole populations (Curkovic et al. 2013).
+"""Criteria of motions, for whole populations: of strings of via-points, and of a planar robot.
 
-C2, C3 and C4 are those of Eqs. 6–8.
+Rana & Zalzala 1995, Eqs. 2–7: short, even and free of collisions. Curkovic et al. 2013: C2, C3 and
+C4 are those of Eqs. 6–8.
 """
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative
+
+
+class StringTerms(NamedTuple):
+    """Terms of a population of strings."""
+
+    lengths: FloatArray  # (arms, individuals) C1, C2, … in configuration space (Eqs. 2, 3) [deg]
+    unevenness: FloatArray  # (arms, individuals) C3, C4, …: Σ |distance − mean| (Eqs. 4, 5) [deg]
+    collisions: FloatArray  # (individuals,) C5: colliding instants i = 1 … N (Eq. 6)
+    cost: FloatArray  # (individuals,) what Eq. 7 subtracts from C_max
+
+
+class StringFitness(Component):
+    """Weights of Eq. 7, read with the sign that punishes collisions.
+
+    F = C_max − (k1 ΣC + k2 ΣC + k3 C5).
+    """
+
+    component: ClassVar[str] = "string_fitness"
+
+    length_weight: NonNegative  # k1 [1/deg]
+    unevenness_weight: NonNegative  # k2 [1/deg]
+    collision_weight: NonNegative  # k3 per colliding instant
+    fitness_offset: NonNegative  # C_max; roulette weights are max(F, 0)
+
+    @property
+    def weights(self) -> tuple[float, float, float]:
+        """k1, k2, k3, as the kernel `weigh` takes them."""
+        return self.length_weight, self.unevenness_weight, self.collision_weight
+
+    def fitness(self, cost: FloatArray) -> FloatArray:
+        """Return the paper's fitness F of a cost, any shape."""
+        return self.fitness_offset - cost
+
+
+@kernel
+def weigh(weights: tuple[float, float, float], terms: StringTerms) -> None:
+    """Write the bracket of Eq. 7 for every individual that has a cost, by k1, k2, k3."""
+    (k1, k2, k3), (lengths, unevenness, collisions, cost) = weights, terms
+    for k in range(len(cost)):
+        length, uneven = 0.0, 0.0
+        for arm in range(len(lengths)):
+            length += lengths[arm, k]
+            uneven += unevenness[arm, k]
+        cost[k] = (k1 * length + k2 * uneven) + k3 * collisions[k]
+
+
+@kernel
+def count_collisions(clearance: FloatArray, collisions: FloatArray) -> None:
+    """Count the instants at which each individual collides (Eq. 6), (lanes,).
+
+    Clearances are (instants, substeps, lanes): one negative one of an instant is enough.
+    """
+    instants, substeps, lanes = clearance.shape
+    hit = np.empty(lanes)
+    collisions[:] = 0.0
+    for i in range(instants):
+        hit[:] = 0.0
+        for s in range(substeps):
+            row = clearance[i, s]
+            for lane in range(lanes):
+                hit[lane] = 1.0 if row[lane] < 0.0 else hit[lane]
+        for lane in range(lanes):
+            collisions[lane] += hit[lane]
 
 
 class MotionCriteria(Component):

@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.evolution.operators.breeding import (
-    Breeding,
-    Operators,
-    PopulationSettings,
-    ScaledGenetic,
-)
-from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.operators import operator
 from evoexp.numeric.elementary import standard_normal
 from evoexp.numeric.generator_state import state_bytes, states_behind
 from evoexp.numeric.random_stream import Draws
@@ -42,7 +36,7 @@ class TableSearch(ABC):
     queries_each = 0  # configurations that judging an individual asks for
     is_done = False  # whether the search ends before its last generation
 
-    def __init__(self, ga: PopulationSettings, per_call: int) -> None:
+    def __init__(self, ga: operator.PopulationSettings, per_call: int) -> None:
         """Begin a run that computes `per_call` generations per call, at most."""
         # the generations of a call, and the one before them
         self.num_places = min(per_call, ga.num_generations) + 1
@@ -137,9 +131,9 @@ class GeneticSearch(TableSearch):
 
     def __init__(
         self,
-        ga: PopulationSettings,
-        operators: Operators,  # by which offspring are made
-        genome: Genome,  # of every individual
+        ga: operator.PopulationSettings,
+        operators: operator.Operators,  # by which offspring are made
+        genome: operator.Genome,  # of every individual
         per_call: int,  # generations computed per call, at most
     ) -> None:
         """Begin a run."""
@@ -147,7 +141,7 @@ class GeneticSearch(TableSearch):
         takes_normals, count = operators.mutation.takes_normals, ga.num_offspring
         super().__init__(ga, 1 if takes_normals else per_call)
         self.operators = operators.addresses  # the first arguments of a kernel that breeds
-        self.breeding = Breeding.of(operators, genome, ga, [count])  # and their rules
+        self.breeding = operator.Breeding.of(operators, genome, ga, [count])  # and their rules
         self.num_drawn = int(self.breeding.sizes.sum())  # uniform numbers of a generation
         # normal deviates of a generation: genes, offspring
         self.num_normals = len(genome.limits) if takes_normals else 0, count
@@ -184,7 +178,7 @@ class ScaledSearch(TableSearch):
 
     table: Any  # a NamedTuple of arrays, whose first axis are generations that take turns
 
-    def __init__(self, ga: ScaledGenetic, per_call: int, num_drawn: int) -> None:
+    def __init__(self, ga: operator.ScaledGenetic, per_call: int, num_drawn: int) -> None:
         """Begin a run that draws `num_drawn` uniform numbers at once, at least."""
         super().__init__(ga, per_call)
         self.draws = Draws(num_drawn)

@@ -336,7 +336,6 @@ class WrappedPlanner(PlannerDefaults, Component):
 
 
 def _as_wrapped(name: str) -> Any:
-    """Return a member that is the wrapped planner's."""
     if callable(MEMBERS[name]):
         return lambda self, *arguments: getattr(self.planner, name)(*arguments)
     return property(lambda self: getattr(self.planner, name))

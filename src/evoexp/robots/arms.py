@@ -9,8 +9,7 @@ from pydantic import Field, model_validator
 
 from evoexp.attachments import File
 from evoexp.errors import SettingError, demand
-from evoexp.numeric.elementary import DEGREE, sincos
-from evoexp.numeric.ordered_sums import length, matrix_product, rotation_matrix
+from evoexp.numeric.elementary import DEGREE, length, matrix_product, rotation_matrix, sincos
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import (
     AppendArm,

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.errors import demand, demand_known
-from evoexp.numeric.ordered_sums import length, rotation_matrix
+from evoexp.numeric.elementary import length, rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.robots.kinematics import KinematicTable, check_size, kinematic_table
 from evoexp.validation import Component

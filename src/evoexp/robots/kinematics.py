@@ -17,8 +17,7 @@ import pinocchio as pin
 
 from evoexp.errors import EvoexpError, SettingError
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.elementary import sincos
-from evoexp.numeric.ordered_sums import length, matrix_product
+from evoexp.numeric.elementary import length, matrix_product, sincos
 from evoexp.numeric.vectors import LANES, Vector, load, spread, store
 from evoexp.records import BoolArray, FloatArray, IntArray
 

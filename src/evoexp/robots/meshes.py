@@ -27,7 +27,7 @@ from evoexp.errors import SettingError, demand
 from evoexp.input_files import stand_in
 from evoexp.numeric.cache_folder import cache_root, kept
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import matrix_product
 from evoexp.records import FloatArray, IntArray
 
 Decomposition = Literal["coacd", "hulls"]

@@ -13,15 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import BeforeValidator
 
-from evoexp.attachments import (
-    SHA256,
-    File,
-    file_content,
-    keep,
-    located,
-    mesh_content,
-    package_folders,
-)
+from evoexp import attachments
 from evoexp.errors import SettingError, nearest
 from evoexp.robots.assembly import AppendArm, Assembly, Chain, Point3, assembled
 from evoexp.robots.meshes import Decomposition, mesh_pieces, whole_mesh
@@ -38,13 +30,12 @@ class Mesh(Settings):
     """A mesh of a collision body."""
 
     name: str  # as the URDF names it
-    file: File  # its content
+    file: attachments.File  # its content
     # the convex pieces in its place, see `mesh_pieces`; None: it stays as it is
-    pieces: File | None = None
+    pieces: attachments.File | None = None
 
 
 def _pairs(value: Any) -> Any:
-    """Turn a mapping of names to values into pairs in the order of the names."""
     return tuple(sorted(value.items())) if isinstance(value, dict) else value
 
 
@@ -85,9 +76,11 @@ class Urdf(Chain):
 
     component: ClassVar[str] = "urdf"
 
-    urdf: File  # the URDF
+    urdf: attachments.File  # the URDF
     meshes: tuple[Mesh, ...] = ()  # of its collision bodies
-    srdf: File | None = None  # names pairs of links that are never judged; None: none are named
+    srdf: attachments.File | None = (
+        None  # names pairs of links that are never judged; None: none are named
+    )
     # the link, fixed to the ground, whose frame stands at the base; empty: the root
     base_frame: str = ""
     base_position: Point3 = (0.0, 0.0, 0.0)  # where the base stands in the world [m]
@@ -115,9 +108,9 @@ class Urdf(Chain):
     decomposition: Decomposition | None = None
     # A URDF of spheres, link by link, that cover the bodies in a search; they need not
     # contain them. None: covers are found
-    spheres: File | None = None
+    spheres: attachments.File | None = None
     # pairs of bodies that need no test, derived when the files are read; None: none are
-    pairs: File | None = None
+    pairs: attachments.File | None = None
 
     @property
     def file(self) -> UrdfFile:
@@ -165,9 +158,9 @@ class Urdf(Chain):
         if path in (None, "???"):
             raise SettingError(f"{field}.path", "given: the path of a URDF", None)
         srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
-        packages = package_folders(settings.pop("packages", None), f"{field}.packages")
-        content = file_content(path, f"{field}.path")
-        file = Path(located(str(path)))
+        packages = attachments.package_folders(settings.pop("packages", None), f"{field}.packages")
+        content = attachments.file_content(path, f"{field}.path")
+        file = Path(attachments.located(str(path)))
         with _named(file):
             links = urdf_file(content, f"{field}.path").links
         meshes: dict[str, dict[str, Any]] = {}
@@ -177,13 +170,13 @@ class Urdf(Chain):
             if name is None or name in meshes:
                 continue
             with _named(f"link '{link}' of {file}"):
-                data = mesh_content(name, file, packages, f"{field}.path")
+                data = attachments.mesh_content(name, file, packages, f"{field}.path")
                 data = whole_mesh(data, name, f"{field}.path")
-            meshes[name] = {"name": name, "file": {SHA256: keep(data)}}
+            meshes[name] = {"name": name, "file": {attachments.SHA256: attachments.keep(data)}}
             if how in get_args(Decomposition):
                 cut = mesh_pieces(data, Path(name).suffix, how, f"{field}.decomposition")
-                meshes[name]["pieces"] = {SHA256: keep(cut)}
-        settings["urdf"] = {SHA256: keep(content)}
+                meshes[name]["pieces"] = {attachments.SHA256: attachments.keep(cut)}
+        settings["urdf"] = {attachments.SHA256: attachments.keep(content)}
         if meshes:
             settings["meshes"] = list(meshes.values())
         for name, path, check in (
@@ -191,8 +184,8 @@ class Urdf(Chain):
             ("srdf", srdf, parsed_xml),
         ):
             if path is not None:
-                content = file_content(path, f"{field}.{name}")
+                content = attachments.file_content(path, f"{field}.{name}")
                 with _named(path):
                     check(content, f"{field}.{name}")
-                settings[name] = {SHA256: keep(content)}
+                settings[name] = {attachments.SHA256: attachments.keep(content)}
         return settings

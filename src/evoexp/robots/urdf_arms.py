@@ -7,8 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.errors import SettingError, demand, demand_known
-from evoexp.numeric.elementary import DEGREE, sincos
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import DEGREE, matrix_product, sincos
 from evoexp.robots.assembly import AppendArm, ArmParts, ArmStates, Link, LinkFrames, Tool, placed
 from evoexp.robots.kinematics import own_axis, pose_of
 from evoexp.robots.urdf_model import joint_roles, placed_bodies, standing_values, urdf_model

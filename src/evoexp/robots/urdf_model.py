@@ -12,8 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.errors import SettingError, demand, demand_known, nearest
-from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.ordered_sums import length
+from evoexp.numeric.elementary import DEGREE, length
 from evoexp.records import FloatArray
 from evoexp.robots.meshes import mesh_shape, read_pieces, unit_of
 from evoexp.robots.urdf_reading import (

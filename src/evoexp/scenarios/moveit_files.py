@@ -15,8 +15,7 @@ import yaml
 
 from evoexp.errors import SettingError, demand, nearest
 from evoexp.input_files import MEGABYTE
-from evoexp.numeric.elementary import DEGREE, atan2
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import DEGREE, atan2, matrix_product
 from evoexp.records import FloatArray
 
 MAX_SCENE = 4 * MEGABYTE  # the largest of the data set MotionBenchMaker has 12 kB

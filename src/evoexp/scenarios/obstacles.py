@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError, demand
-from evoexp.numeric.ordered_sums import length, matrix_product, rotation_matrix
+from evoexp.numeric.elementary import length, matrix_product, rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative, Positive, Settings
 

@@ -13,23 +13,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from evoexp.collision.bodies.body_tables import (
-    AROUND,
-    BETWEEN,
-    FIRST_BALL,
-    FIRST_PART,
-    FIRST_RUN,
-    MARGIN,
-    REACH,
-    SELF,
-    STOP_ENTRY,
-    STOP_PART,
-    STOP_RUN,
-    THICKNESS,
-    BodyTables,
-    FlatTables,
-    flattened,
-)
+from evoexp.collision.bodies import body_tables
 from evoexp.collision.bodies.clearance_kernels import least_clearances, num_free
 from evoexp.collision.distance_maps import DistanceMap
 from evoexp.numeric.compilation import KernelAddress, kernel
@@ -81,7 +65,7 @@ def pack_tables(
     ignored: Iterable[BodyPair],
     arms: Sequence[int],
     maps: Sequence[DistanceMap],
-) -> BodyTables:
+) -> body_tables.BodyTables:
     """Return the tables of a robot among obstacles; see `BodyCollision.build`."""
     kind, size = obstacles.without_ellipses().kind, obstacles.size
     numbers, first = np.unique(shapes.body, return_index=True)
@@ -89,16 +73,20 @@ def pack_tables(
     tables = _pack_bodies(table, shapes, obstacles, numbers, joints)
     # half the edges and the thickness of a box that an obstacle is, or that is around a cylinder
     cores = tables.cores
-    cores[kind == SPHERE, THICKNESS] = size[kind == SPHERE, 0]
-    cores[kind == BOX, :THICKNESS] = size[kind == BOX]
-    cores[kind == CYLINDER, :THICKNESS] = size[kind == CYLINDER][:, [0, 0, 1]]
-    cores[kind == CAPSULE, 2 : THICKNESS + 1] = size[kind == CAPSULE, 1::-1]
-    edges = np.where((kind == CYLINDER)[:, None], size, cores[:, :THICKNESS])
-    cores[:, AROUND] = np.sqrt((edges * edges).sum(axis=1)) + cores[:, THICKNESS]
+    cores[kind == SPHERE, body_tables.THICKNESS] = size[kind == SPHERE, 0]
+    cores[kind == BOX, : body_tables.THICKNESS] = size[kind == BOX]
+    cores[kind == CYLINDER, : body_tables.THICKNESS] = size[kind == CYLINDER][:, [0, 0, 1]]
+    cores[kind == CAPSULE, 2 : body_tables.THICKNESS + 1] = size[kind == CAPSULE, 1::-1]
+    edges = np.where((kind == CYLINDER)[:, None], size, cores[:, : body_tables.THICKNESS])
+    cores[:, body_tables.AROUND] = (
+        np.sqrt((edges * edges).sum(axis=1)) + cores[:, body_tables.THICKNESS]
+    )
     # a bound of all coordinates
     reach = np.sqrt((tables.chain.translation**2).sum(axis=1)).sum()
-    reach += (np.sqrt((tables.balls[:, :3] ** 2).sum(axis=1)) + tables.balls[:, REACH]).max()
-    outside = np.sqrt((obstacles.center**2).sum(axis=1)) + cores[:, AROUND]
+    reach += (
+        np.sqrt((tables.balls[:, :3] ** 2).sum(axis=1)) + tables.balls[:, body_tables.REACH]
+    ).max()
+    outside = np.sqrt((obstacles.center**2).sum(axis=1)) + cores[:, body_tables.AROUND]
     tables = tables._replace(scale=float(reach + max(outside, default=0.0)))
     entries, owners = _pack_entries(tables, numbers, joints, set(ignored))
     body_arms = [arms[joint] if arms else 0 for joint in joints]
@@ -122,7 +110,7 @@ def _pack_bodies(
     obstacles: ObstacleTable,
     numbers: IntArray,
     joints: IntArray,
-) -> BodyTables:
+) -> body_tables.BodyTables:
     """Return tables of all shapes, body by body and part by part, without entries and pairs."""
     # ends and axes in the table's frames
     turn = np.concatenate([np.eye(3)[None], table.alignment.transpose(0, 2, 1)])[shapes.joint]
@@ -154,10 +142,10 @@ def _pack_bodies(
         bodies.append((frame, begin[0], len(runs), begin[1], len(capsules), 0, 0, 0, *places))
         balls.append(_ball(start, axis, radius, own))
     nothing, of = np.empty(0, dtype=np.int64), capsules
-    return BodyTables(
+    return body_tables.BodyTables(
         table.chain,
         obstacles,
-        np.zeros((len(obstacles.kind), AROUND + 1)),
+        np.zeros((len(obstacles.kind), body_tables.AROUND + 1)),
         np.array(bodies + parts, dtype=np.int64),
         np.array(balls + part_balls),
         np.array(runs, dtype=np.int64).reshape(-1, 2),
@@ -199,7 +187,7 @@ def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: IntArray
 
 
 def _pack_entries(
-    tables: BodyTables, numbers: IntArray, joints: IntArray, ignored: set[BodyPair]
+    tables: body_tables.BodyTables, numbers: IntArray, joints: IntArray, ignored: set[BodyPair]
 ) -> tuple[FloatArray, IntArray]:
     """Return entries and owners, and write their places into the units.
 
@@ -213,14 +201,16 @@ def _pack_entries(
         ends = [len(owners)]
         for group in (balls, flats):
             chosen = [o for o in group.tolist() if joint > 0 and (number, o) not in ignored]
-            entries += [_entry(tables, o, float(tables.balls[b, REACH])) for o in chosen]
+            entries += [
+                _entry(tables, o, float(tables.balls[b, body_tables.REACH])) for o in chosen
+            ]
             owners += chosen
             ends.append(len(owners))
-        tables.units[b, FIRST_BALL : STOP_ENTRY + 1] = ends
+        tables.units[b, body_tables.FIRST_BALL : body_tables.STOP_ENTRY + 1] = ends
     return np.array(entries).reshape(-1, 4), np.array(owners, dtype=np.int64)
 
 
-def _entry(tables: BodyTables, o: int, reach: float) -> FloatArray:
+def _entry(tables: body_tables.BodyTables, o: int, reach: float) -> FloatArray:
     """Return the coefficients of a function of a ball's centre m: positive where it is far enough.
 
     The function is m² + (e0, e1, e2) · m + e3 for a ball of radius R around an obstacle at c:
@@ -229,14 +219,17 @@ def _entry(tables: BodyTables, o: int, reach: float) -> FloatArray:
     center = tables.obstacles.center[o]
     if tables.obstacles.kind[o] == HALF_SPACE:
         normal = tables.obstacles.rotation[o, [2, 5, 8]]
-        level = (normal * center).sum() + reach * MARGIN
+        level = (normal * center).sum() + reach * body_tables.MARGIN
         return tables.scale * np.array([*normal, -level])
-    within = (float(tables.cores[o, AROUND]) + reach) * MARGIN
+    within = (float(tables.cores[o, body_tables.AROUND]) + reach) * body_tables.MARGIN
     return np.array([*(-2.0 * center), (center**2).sum() - within * within])
 
 
 def _pack_pairs(
-    tables: BodyTables, numbers: IntArray, arms: Sequence[int], pairs: Iterable[BodyPair]
+    tables: body_tables.BodyTables,
+    numbers: IntArray,
+    arms: Sequence[int],
+    pairs: Iterable[BodyPair],
 ) -> tuple[IntArray, IntArray]:
     """Return pairs of bodies, and pairs of their parts; the part with more spheres comes first.
 
@@ -246,17 +239,19 @@ def _pack_pairs(
     units, runs = tables.units, tables.runs
     counts = [
         int((runs[first:stop, 1] - runs[first:stop, 0]).sum())
-        for first, stop in units[:, FIRST_RUN : STOP_RUN + 1].tolist()
+        for first, stop in units[:, body_tables.FIRST_RUN : body_tables.STOP_RUN + 1].tolist()
     ]
     of_bodies: list[tuple[int, ...]] = []
     of_parts: list[tuple[int, int]] = []
     for one, two in pairs:
         a, b, first = body[one], body[two], len(of_parts)
         between = arms[a] != arms[b] and min(arms[a], arms[b]) >= 0
-        for i in range(*units[a, FIRST_PART : STOP_PART + 1].tolist()):
-            for j in range(*units[b, FIRST_PART : STOP_PART + 1].tolist()):
+        for i in range(*units[a, body_tables.FIRST_PART : body_tables.STOP_PART + 1].tolist()):
+            for j in range(*units[b, body_tables.FIRST_PART : body_tables.STOP_PART + 1].tolist()):
                 of_parts.append((i, j) if counts[i] >= counts[j] else (j, i))
-        of_bodies.append((a, b, first, len(of_parts), BETWEEN if between else SELF))
+        of_bodies.append(
+            (a, b, first, len(of_parts), body_tables.BETWEEN if between else body_tables.SELF)
+        )
     return (
         np.array(of_bodies, dtype=np.int64).reshape(-1, 5),
         np.array(of_parts, dtype=np.int64).reshape(-1, 2),
@@ -311,7 +306,7 @@ _address = functools.cache(KernelAddress)
 class BodyCollision(NamedTuple):
     """Spheres and capsules on one robot, the obstacles around it, and the pairs to be checked."""
 
-    tables: FlatTables  # robot, obstacles and pairs, as kernels take them
+    tables: body_tables.FlatTables  # robot, obstacles and pairs, as kernels take them
     nq: int  # coordinates of the robot
 
     @classmethod
@@ -339,7 +334,7 @@ class BodyCollision(NamedTuple):
             maps: Distances of pairs that their shapes do not tell.
         """
         packed = pack_tables(table, shapes, obstacles, pairs, ignored, arms, maps)
-        return cls(flattened(packed), table.num_coordinates)
+        return cls(body_tables.flattened(packed), table.num_coordinates)
 
     @classmethod
     def of_pair(

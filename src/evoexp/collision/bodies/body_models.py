@@ -13,16 +13,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision import distance_maps
 from evoexp.collision.bodies.body_collision import BodyCollision, Shapes
 from evoexp.collision.box_support import coal
-from evoexp.collision.covers.body_covers import (
-    Cover,
-    around_cylinder,
-    capsule_cover,
-    given_cover,
-    inner_balls,
-    kept_sphere_cover,
-)
+from evoexp.collision.covers import body_covers
 from evoexp.collision.derived_pairs import (
     DerivedPairs,
     Pair,
@@ -30,12 +24,6 @@ from evoexp.collision.derived_pairs import (
     derive_pairs,
     joint_limits,
     sampled_configurations,
-)
-from evoexp.collision.distance_maps import (
-    DistanceMap,
-    approach_speeds,
-    coal_distances,
-    distance_map,
 )
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
@@ -114,7 +102,7 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     The distances are those of the covers or, where these are too close, coal's on a coarser grid.
     Pairs with more than two joints between them are never proven, and so always tested.
     """
-    way = approach_speeds(assembly, pair)
+    way = distance_maps.approach_speeds(assembly, pair)
     moving = np.flatnonzero(way > 0.0)
     if len(moving) > 2:
         return False
@@ -122,7 +110,7 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     if float(BodyCollision.of_pair(assembly.table, shapes, pair).clearance(q).least.min()) > slack:
         return True
     q, slack = _grid(assembly, moving, way, COARSE_GRID)
-    return bool(coal_distances(assembly, pair, q).min() > slack)
+    return bool(distance_maps.coal_distances(assembly, pair, q).min() > slack)
 
 
 def _grid(
@@ -145,7 +133,7 @@ def _grid(
 class CollisionModel(Component):
     """Base of the collision models that cover bodies: sphere sets and capsules."""
 
-    def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
+    def cover(self, item: Any, given: FloatArray | None = None) -> body_covers.Cover:
         """Return the cover that stands for a geometry object, for which spheres may be given."""
         raise NotImplementedError
 
@@ -167,11 +155,11 @@ class SphereSets(CollisionModel):
     # how far spheres may reach beyond a body; less takes more spheres [length unit]
     inflation: Positive
 
-    def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
+    def cover(self, item: Any, given: FloatArray | None = None) -> body_covers.Cover:
         """Return the given spheres, or else spheres around a geometry object."""
         if given is None or len(given) == 0:
-            return kept_sphere_cover(item, self.inflation)
-        return given_cover(item, given)
+            return body_covers.kept_sphere_cover(item, self.inflation)
+        return body_covers.given_cover(item, given)
 
 
 class BodyCapsules(CollisionModel):
@@ -185,10 +173,10 @@ class BodyCapsules(CollisionModel):
     # covered best by the first
     around_cylinders: bool = False
 
-    def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
+    def cover(self, item: Any, given: FloatArray | None = None) -> body_covers.Cover:
         """Return the capsule around a geometry object."""
         is_around = self.around_cylinders and isinstance(item.geometry, coal.Cylinder)
-        found = around_cylinder(item) if is_around else capsule_cover(item)
+        found = body_covers.around_cylinder(item) if is_around else body_covers.capsule_cover(item)
         return found._replace(
             radius=found.radius + self.padding, inflation=found.inflation + self.padding
         )
@@ -198,14 +186,14 @@ class BodyModel(NamedTuple):
     """A robot's bodies, covered."""
 
     assembly: Assembly  # the robot
-    covers: tuple[Cover, ...]  # one per body
+    covers: tuple[body_covers.Cover, ...]  # one per body
     shapes: Shapes  # all of them; a shape's body is its index among the geometry objects
     sorted_pairs: BodyPairs  # pairs of bodies, by who judges them
     asked: float = np.inf  # how far covers are asked to reach beyond bodies at most [length unit]
     # bodies whose covers were made smaller (`fitted`), and by how much
     shrunk: tuple[tuple[int, float], ...] = ()
     # of pairs whose covers always touch; a search tests those of `sorted_pairs.mapped`
-    maps: tuple[DistanceMap, ...] = ()
+    maps: tuple[distance_maps.DistanceMap, ...] = ()
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -295,9 +283,9 @@ class BodyModel(NamedTuple):
 
     def with_maps(self) -> "BodyModel":
         """Return the bodies with maps of the distances of pairs whose covers always touch."""
-        pairs, maps = self.sorted_pairs, dict[Pair, DistanceMap]()
+        pairs, maps = self.sorted_pairs, dict[Pair, distance_maps.DistanceMap]()
         for pair in pairs.overlapping:
-            if (of_pair := distance_map(self.assembly, pair)) is not None:
+            if (of_pair := distance_maps.distance_map(self.assembly, pair)) is not None:
                 maps[pair] = of_pair
         left = tuple(pair for pair in pairs.overlapping if pair not in maps)
         pairs = pairs._replace(overlapping=left, mapped=tuple(maps))
@@ -320,7 +308,7 @@ class BodyModel(NamedTuple):
         for body in sorted({body for body, _ in allowed}):
             if body == own and carried is not None:
                 inner[body] = _shapes(carried.inner, carried.joint, body)
-            elif (cover := inner_balls(items[body], depth)) is not None:
+            elif (cover := body_covers.inner_balls(items[body], depth)) is not None:
                 inner[body] = _shapes(cover, items[body].parentJoint, body)
         if not inner:
             return None
@@ -374,11 +362,11 @@ class Carried(NamedTuple):
     """An object that became part of a robot's geometry."""
 
     joint: int  # that moves it
-    cover: Cover  # in the joint's frame
-    inner: Cover  # shapes inside it, in the joint's frame, see `inner_balls`
+    cover: body_covers.Cover  # in the joint's frame
+    inner: body_covers.Cover  # shapes inside it, in the joint's frame, see `inner_balls`
     watched: tuple[int, ...]  # bodies of the robot that it must not touch
 
 
-def _shapes(cover: Cover, joint: int, body: int) -> Shapes:
+def _shapes(cover: body_covers.Cover, joint: int, body: int) -> Shapes:
     joints, bodies = (np.full(len(cover.radius), number) for number in (joint, body))
     return Shapes(joints, cover.start, cover.end, cover.radius, bodies)

@@ -20,8 +20,7 @@ from evoexp.collision.bodies.body_collision import (
 )
 from evoexp.collision.bodies.covered_bodies import ArmCollision
 from evoexp.errors import demand
-from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import DEGREE, matrix_product
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import frame_poses

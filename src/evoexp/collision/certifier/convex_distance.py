@@ -19,16 +19,7 @@ from typing import cast
 
 import numpy as np
 
-from evoexp.collision.body_table import (
-    BOX,
-    CONE,
-    CYLINDER,
-    ELLIPSOID,
-    HALF_SPACE,
-    HULL,
-    SEGMENT,
-    BodyTable,
-)
+from evoexp.collision import body_table
 from evoexp.numeric.compilation import inlined
 from evoexp.records import FloatArray
 
@@ -46,7 +37,7 @@ CONVERGED = 1e-13
 
 @inlined
 def distance_bounds(
-    bodies: BodyTable,
+    bodies: body_table.BodyTable,
     world: FloatArray,
     one: int,
     two: int,
@@ -78,8 +69,8 @@ def distance_bounds(
     kind, size = bodies.kind, bodies.size
     radii = bodies.radius[one] + bodies.radius[two]
     # a half-space and another body: the body's lowest point above the plane
-    if kind[one] == HALF_SPACE or kind[two] == HALF_SPACE:
-        plane, body = (one, two) if kind[one] == HALF_SPACE else (two, one)
+    if kind[one] == body_table.HALF_SPACE or kind[two] == body_table.HALF_SPACE:
+        plane, body = (one, two) if kind[one] == body_table.HALF_SPACE else (two, one)
         x, y, z = world[plane, 2], world[plane, 5], world[plane, 8]
         normal[0], normal[1], normal[2] = -x, -y, -z
         support(bodies, world, body, normal, 1.0, scratch[0])
@@ -89,7 +80,7 @@ def distance_bounds(
         normal[0], normal[1], normal[2] = sign * x, sign * y, sign * z
         return distance, distance
     # two balls or capsules: closed form
-    if kind[one] == SEGMENT and kind[two] == SEGMENT:
+    if kind[one] == body_table.SEGMENT and kind[two] == body_table.SEGMENT:
         distance = segment_distance(world[one], size[one, 0], world[two], size[two, 0], normal)
         return distance - radii, distance - radii
     # the balls around both bodies are far enough apart
@@ -106,7 +97,7 @@ def distance_bounds(
 
 @inlined
 def _gjk(
-    bodies: BodyTable,
+    bodies: body_table.BodyTable,
     world: FloatArray,
     one: int,
     two: int,
@@ -267,7 +258,7 @@ def _holds(simplex: FloatArray, count: int, x: float, y: float, z: float) -> boo
 
 @inlined
 def support(
-    bodies: BodyTable,
+    bodies: body_table.BodyTable,
     world: FloatArray,
     body: int,
     direction: FloatArray,
@@ -281,30 +272,30 @@ def support(
     w = world[body]
     z = w[2] * dx + w[5] * dy + w[8] * dz
     a, b, c = size[body, 0], size[body, 1], size[body, 2]
-    if kind == SEGMENT:
+    if kind == body_table.SEGMENT:
         e = a if z > 0.0 else -a
         out[0], out[1], out[2] = w[9] + w[2] * e, w[10] + w[5] * e, w[11] + w[8] * e
         return
     # the direction, then the point, in the core's own frame
     x, y = w[0] * dx + w[3] * dy + w[6] * dz, w[1] * dx + w[4] * dy + w[7] * dz
-    if kind == BOX:
+    if kind == body_table.BOX:
         x, y, z = (a if x > 0.0 else -a), (b if y > 0.0 else -b), (c if z > 0.0 else -c)
-    elif kind == ELLIPSOID:
+    elif kind == body_table.ELLIPSOID:
         x, y, z = a * x, b * y, c * z
         norm = np.sqrt(x * x + y * y + z * z)
         x, y, z = a * x / norm, b * y / norm, c * z / norm
-    elif kind in (CYLINDER, CONE):
+    elif kind in (body_table.CYLINDER, body_table.CONE):
         norm = np.sqrt(x * x + y * y)
         scale = a / norm if norm > 0.0 else 0.0
-        if kind == CONE and 2.0 * b * z > a * norm:
+        if kind == body_table.CONE and 2.0 * b * z > a * norm:
             x, y, z = 0.0, 0.0, b
-        elif kind == CONE:
+        elif kind == body_table.CONE:
             x, y, z = scale * x, scale * y, -b
         else:
             x, y, z = scale * x, scale * y, (b if z > 0.0 else -b)
-    elif kind == HALF_SPACE:
+    elif kind == body_table.HALF_SPACE:
         x, y, z = 0.0, 0.0, 0.0
-    elif kind == HULL:
+    elif kind == body_table.HULL:
         best, chosen = -np.inf, int(bodies.corners[body, 0])
         for k in range(bodies.corners[body, 0], bodies.corners[body, 1]):
             height = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]

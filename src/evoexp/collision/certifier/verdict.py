@@ -10,14 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.certifier.coal_distances import (
-    CoalDistance,
-    LeafGoals,
-    QueryLimit,
-    first_contact,
-    search_interval,
-    walk_down,
-)
+from evoexp.collision.certifier import coal_distances
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
 from evoexp.collision.certifier.task import MAX_POLISHED, motion_task, polish, work_space
 from evoexp.collision.motion_bounds import approach_bounds
@@ -99,7 +92,7 @@ class _Judgement:
         self.margins[:] = security_margin
         self.scene, self.motion = scene, motion
         self.tolerances, self.resolution = scene.tolerances, resolution
-        self.coal = CoalDistance(scene, motion, MOST_QUERIES)
+        self.coal = coal_distances.CoalDistance(scene, motion, MOST_QUERIES)
         self.floor = 1e-6 * scene.size
         self.intervals, self.looked, self.wants_first = 0, False, True
         self.best = _Candidate(np.inf, np.nan, -1)
@@ -121,7 +114,7 @@ class _Judgement:
             proven = min(bound, self.best.distance)
             status: Status = "certified" if proven > -np.inf else "undecided"
             return self._free(status, self._judge_margin(status, proven), proven)
-        except QueryLimit:
+        except coal_distances.QueryLimit:
             return self._free("undecided", "refuted" if self._too_close() else "undecided", -np.inf)
 
     def is_clear(self) -> bool:
@@ -137,7 +130,7 @@ class _Judgement:
                 goal[own] = level[own] = -np.inf
         try:
             contact, bound = self._search(np.inf, goal, level)
-        except QueryLimit:
+        except coal_distances.QueryLimit:
             return False
         return contact is None and bound > -np.inf
 
@@ -149,7 +142,6 @@ class _Judgement:
         )
 
     def _too_close(self) -> bool:
-        """Return whether the closest pair comes closer than its own margin."""
         pair = self.best.pair
         return pair >= 0 and bool(self.best.distance < self.margins[pair] - self.tolerances[pair])
 
@@ -198,7 +190,9 @@ class _Judgement:
             if found.first[0] < np.inf:
                 pair = int(found.first_pair[0])
                 near = min(float(found.first[0]), self.task.last)
-                t = first_contact(self.coal, pair, near, level[pair], self.wants_first)
+                t = coal_distances.first_contact(
+                    self.coal, pair, near, level[pair], self.wants_first
+                )
                 if t is None:  # coal sees no contact there: coal alone judges this pair
                     self.task.exact[pair] = self.all_exact = self.looked = False
                     continue
@@ -227,9 +221,9 @@ class _Judgement:
             approach_bounds(task.chain, piece, u, v, task.weights, speeds, scratch)
             known = min(self.best.distance, float(found.least[0]))
             asked = goal[p], level[p], self.tolerances[p], known, resolution, self.floor
-            goals = LeafGoals(*asked, self.wants_first)
+            goals = coal_distances.LeafGoals(*asked, self.wants_first)
             end = min(end, float(self.motion.num_segments))
-            leaf = search_interval(self.coal, p, (begin, end), speeds[0, p], goals)
+            leaf = coal_distances.search_interval(self.coal, p, (begin, end), speeds[0, p], goals)
             self._note(_Candidate(leaf.least, leaf.at, p))
             proven = min(proven, leaf.proven)
             if leaf.first < np.inf and (contact is None or leaf.first < contact.t):
@@ -242,7 +236,7 @@ class _Judgement:
         self._polish_from(found.pair_least, found.pair_least_at, worth)
         if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
             distance, t = self.best.distance, self.best.t
-            t, distance = walk_down(self.coal, self.best.pair, t, 1e-3)
+            t, distance = coal_distances.walk_down(self.coal, self.best.pair, t, 1e-3)
             self._note(_Candidate(distance, t, self.best.pair))
 
     def _polish_from(self, least: FloatArray, begins: FloatArray, worth: float) -> None:

@@ -21,8 +21,7 @@ from evoexp.collision.body_table import UnsupportedShape, geometry_key
 from evoexp.collision.box_support import coal, corners_of
 from evoexp.collision.covers.solid_balls import Balls, Solid, solid_of, varied_spheres
 from evoexp.numeric.cache_folder import cache_root, kept
-from evoexp.numeric.elementary import sincos
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import matrix_product, sincos
 from evoexp.records import FloatArray
 
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows

@@ -13,7 +13,7 @@ import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.box_support import coal, corners_of, distance
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.elementary import matrix_product
 from evoexp.records import BoolArray, FloatArray
 
 POINTS_AT_ONCE = 4000  # whose heights above all planes are found together

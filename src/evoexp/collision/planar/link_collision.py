@@ -8,13 +8,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.collision.bodies.body_collision import BodyCollision, Shapes
+from evoexp.collision.planar import planar_arms
 from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
-from evoexp.collision.planar.planar_arms import (
-    Arm,
-    contact_tolerance,
-    largest_coordinate,
-    path_configurations,
-)
 from evoexp.errors import demand
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
@@ -37,7 +32,7 @@ class LinkCrossings(Component):
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "LinkCollision":
         """Return the model of some robots among obstacles."""
         arms = tuple(
-            Arm(arm.base, arm.lengths, self.half_width, self.tcp_radius)
+            planar_arms.Arm(arm.base, arm.lengths, self.half_width, self.tcp_radius)
             for arm in two_link_arms(assembly)
         )
         table = obstacle_table(obstacles).without_ellipses()
@@ -53,7 +48,7 @@ class LinkCrossings(Component):
 class LinkCollision(NamedTuple):
     """Planar robots of two links, and the obstacles around them."""
 
-    arms: tuple[Arm, ...]  # base and link lengths of every robot, and its envelope
+    arms: tuple[planar_arms.Arm, ...]  # base and link lengths of every robot, and its envelope
     solids: tuple[BodyCollision, ...]  # (robots,) each among the obstacles; none without them
     substeps: int  # configurations tested per segment
 
@@ -75,7 +70,7 @@ class LinkCollision(NamedTuple):
         """
         q = path[1:-1]
         if self.substeps > 1:
-            q = path_configurations(q, path[0, :, 0], path[-1, :, 0], self.substeps)
+            q = planar_arms.path_configurations(q, path[0, :, 0], path[-1, :, 0], self.substeps)
         return q
 
     def contact(self, posture: FloatArray) -> str:
@@ -109,13 +104,13 @@ class LinkCollision(NamedTuple):
         return np.asarray(hits.sum(axis=0))
 
 
-def _boundary_shapes(arm: Arm, first: int, obstacles: ObstacleTable) -> Shapes:
+def _boundary_shapes(arm: planar_arms.Arm, first: int, obstacles: ObstacleTable) -> Shapes:
     """Return an arm's lines, or boundary lines, and its circle as thin capsules and a sphere.
 
     They are thicker by what rounding may hide, so that what touches an obstacle collides.
     """
     far = (np.abs(obstacles.center).sum(axis=1) + obstacles.size.sum(axis=1)).max(initial=0.0)
-    near = contact_tolerance(largest_coordinate(arm) + float(far))
+    near = planar_arms.contact_tolerance(planar_arms.largest_coordinate(arm) + float(far))
     beside = (-arm.half_width, arm.half_width) if arm.half_width > 0.0 else (0.0,)
     rows = [
         (first + link, (0.0, y, 0.0), (length, y, 0.0), near, first + link)
@@ -128,7 +123,7 @@ def _boundary_shapes(arm: Arm, first: int, obstacles: ObstacleTable) -> Shapes:
     return Shapes(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
+def two_link_arms(assembly: Assembly) -> tuple[planar_arms.Arm, ...]:
     """Return base and link lengths of every robot, which must be a planar arm of two links."""
     slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
     links = [link for link in assembly.links if not link.is_tool]
@@ -142,5 +137,5 @@ def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
     for first, stop in slices:
         x, y, _ = assembly.table.chain.translation[first]
         lengths = [float(link.end[0]) for link in links if first < link.joint <= stop]
-        arms.append(Arm((float(x), float(y)), (lengths[0], lengths[1])))
+        arms.append(planar_arms.Arm((float(x), float(y)), (lengths[0], lengths[1])))
     return tuple(arms)

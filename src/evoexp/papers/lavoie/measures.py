@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.paths.motion import Motion
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import BoolArray, FloatArray
 from evoexp.report.pages import markdown

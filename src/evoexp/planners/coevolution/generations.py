@@ -8,36 +8,18 @@ import numpy as np
 from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.evolution.operators.breeding import (
-    Breeding,
-    Cross,
-    Mutate,
-    Operators,
-    PopulationSettings,
-    Select,
-    breed,
-)
+from evoexp.evolution.operators import operator
 from evoexp.evolution.operators.crossover import OnePoint
 from evoexp.evolution.operators.mutation import AlleleMutation
-from evoexp.evolution.operators.operator import Crossover, Genome, Mutation, Named, Selection
 from evoexp.evolution.operators.selection import DifferenceRoulette, InverseRoulette
 from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.evolution.teams import BestTeam, Hall, HallRules, best_team
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.coevolution.kernels import (
-    HALF_TURN,
-    Evaluated,
-    Generation,
-    Heredity,
-    copy_fronts,
-    count_members,
-    renew,
-    survey,
-)
+from evoexp.planners.answers import Proofs
+from evoexp.planners.coevolution import kernels
 from evoexp.planners.driver import TableSearch
 from evoexp.planners.planner import Candidate
-from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
 from evoexp.validation import Count, Positive, Rate
 
@@ -48,7 +30,7 @@ MOST = 100  # teams that are judged of one generation; the others are no answer
 _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
-class CoevolutionSettings(PopulationSettings):
+class CoevolutionSettings(operator.PopulationSettings):
     """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3)."""
 
     component: ClassVar[str] = "coevolutionary"
@@ -61,7 +43,7 @@ class CoevolutionSettings(PopulationSettings):
     mutation_direction: Literal["one_sided", "symmetric"]
     # weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the
     # highest
-    selection: Literal["inverse", "difference"] | Named[Selection]
+    selection: Literal["inverse", "difference"] | operator.Named[operator.Selection]
     hall_depth: Rate  # share of a population that the hall of fame may hold [-]; 0: no hall
     # generations after which a team of the hall gives way to any new one [-]; None: never
     hall_memory: Count | None
@@ -78,8 +60,8 @@ class CoevolutionSettings(PopulationSettings):
     # `front`: the present front of each population, the cheapest first, copied to the next
     hall_members: Literal["pairs", "front"] = "pairs"
 
-    crossover: Named[Crossover] | None = None  # None: at one point
-    mutation: Named[Mutation] | None = None  # None: of one allele (Eq. 9)
+    crossover: operator.Named[operator.Crossover] | None = None  # None: at one point
+    mutation: operator.Named[operator.Mutation] | None = None  # None: of one allele (Eq. 9)
 
     @model_validator(mode="after")
     def _settings_agree(self) -> Self:
@@ -115,11 +97,11 @@ class CoevolutionSettings(PopulationSettings):
         return self.population_size - self.num_elites - self.num_hall_teams
 
     @property
-    def operators(self) -> Operators:
+    def operators(self) -> operator.Operators:
         """The paper's operators, where the settings name no others."""
         named: dict[Any, Any] = {"inverse": InverseRoulette(), "difference": DifferenceRoulette()}
         step, symmetric = DEGREE * self.mutation_step, self.mutation_direction == "symmetric"
-        return Operators(
+        return operator.Operators(
             named.get(self.selection, self.selection),
             self.crossover or OnePoint(),
             self.mutation or AlleleMutation(step=step, symmetric=symmetric),
@@ -133,14 +115,14 @@ class CoevolutionSettings(PopulationSettings):
 
 @kernel
 def follow(
-    select: Select,
-    cross: Cross,
-    mutate: Mutate,
+    select: operator.Select,
+    cross: operator.Cross,
+    mutate: operator.Mutate,
     uniforms: FloatArray,  # at least as many as it takes
     index: int,  # the present generation
     rate: float,  # of mutation
-    heredity: Heredity,  # the rules
-    present: Generation,
+    heredity: kernels.Heredity,  # the rules
+    present: kernels.Generation,
 ) -> tuple[FloatArray, int]:
     """Renew the hall of fame, and breed the populations that follow a generation.
 
@@ -150,16 +132,16 @@ def follow(
     """
     rules, hall, (before, judged, _) = heredity.breeding, heredity.hall, present
     if heredity.copies_fronts:
-        copy_fronts(present, heredity)
+        kernels.copy_fronts(present, heredity)
     elif len(hall.teams):
-        renew(present, heredity)
+        kernels.renew(present, heredity)
     teams, num_elites, taken = hall.teams[: hall.num_teams[0]], heredity.num_elites, 0
     fewest, elites = len(teams), np.empty(num_elites, dtype=np.int64)
     for robot in range(len(before)):
-        fewest = min(fewest, count_members(teams, robot))
+        fewest = min(fewest, kernels.count_members(teams, robot))
     size, following = np.sum(rules.sizes[fewest]), np.empty(before.shape)
     for robot in range(len(before)):
-        held = count_members(teams, robot)
+        held = kernels.count_members(teams, robot)
         members, count = teams[:held, robot].copy(), before.shape[2] - num_elites - held
         for k in range(held):
             teams[k, robot] = count + num_elites + k
@@ -170,7 +152,7 @@ def follow(
             continue
         parents = np.empty(count, dtype=np.int64)
         draws, taken = uniforms[taken : taken + size], taken + size
-        breed(
+        operator.breed(
             select, cross, mutate, draws, normals, index, rate, rules, costs, genomes, parents, out
         )
         # elites and members of the hall, untouched
@@ -183,7 +165,7 @@ def follow(
 class TeamSearch(TableSearch):
     """One run."""
 
-    present: Generation  # the one computed last
+    present: kernels.Generation  # the one computed last
 
     def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
         """Begin a run."""
@@ -194,13 +176,13 @@ class TeamSearch(TableSearch):
         num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
         self.costs = np.empty((self.num_places, robots, self._size))
         by_genome, operators = ga.hall_distinct == "genome", ga.operators
-        genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
+        genome = operator.Genome.of(np.repeat([[0.0, kernels.HALF_TURN]], num_genes, axis=0))
         depth = ga.num_hall_teams
         counts = [free - teams for teams in range(depth + 1)]
         self._operators, self._waiting = operators.addresses, 0
-        self._heredity = Heredity(
+        self._heredity = kernels.Heredity(
             ga.num_elites,
-            Breeding.of(operators, genome, ga, counts),
+            operator.Breeding.of(operators, genome, ga, counts),
             problem.moving,
             Hall(
                 teams=np.empty((depth, robots), dtype=np.int64),
@@ -248,9 +230,9 @@ class TeamSearch(TableSearch):
         """Evaluate populations, whatever the model is; see who is proven."""
         found = self._planner.evaluated(self._problem, populations)
         settled = self._proven.settle(populations, found) if self._proven else None
-        best = survey(found, self.summaries[place])
+        best = kernels.survey(found, self.summaries[place])
         self.present, self.costs[place] = (
-            Generation(populations, found, settled or best),
+            kernels.Generation(populations, found, settled or best),
             found.costs,
         )
 
@@ -298,7 +280,7 @@ class ProvenTeams:
         """Motions judged so far."""
         return self._proofs.num_certificates
 
-    def settle(self, populations: FloatArray, found: Evaluated) -> BestTeam:
+    def settle(self, populations: FloatArray, found: kernels.Evaluated) -> BestTeam:
         """Judge teams, the cheapest first, until one is proven; return it, or one not found.
 
         Collisions and costs of those who are refuted are raised.
@@ -309,7 +291,9 @@ class ProvenTeams:
                 return best
         return BestTeam(np.full(len(found.own), -1), np.inf)
 
-    def settle_each(self, populations: FloatArray, found: Evaluated, costs: FloatArray) -> None:
+    def settle_each(
+        self, populations: FloatArray, found: kernels.Evaluated, costs: FloatArray
+    ) -> None:
         """Judge the cheapest teams of the first robot's individuals until one is proven.
 
         `costs` (individuals,) are those of their cheapest teams; changed. See `settle`.
@@ -321,7 +305,9 @@ class ProvenTeams:
             costs[k] = found.cost_of(found.team_of(k))
         costs[:] = np.inf
 
-    def team_of(self, populations: FloatArray, found: Evaluated, individual: int) -> IntArray:
+    def team_of(
+        self, populations: FloatArray, found: kernels.Evaluated, individual: int
+    ) -> IntArray:
         """Return the cheapest proven team with an individual of the first robot; see `settle`."""
         for _ in range(MOST):
             team = found.team_of(individual)
@@ -329,7 +315,7 @@ class ProvenTeams:
                 break
         return team
 
-    def _is_proven(self, populations: FloatArray, found: Evaluated, team: IntArray) -> bool:
+    def _is_proven(self, populations: FloatArray, found: kernels.Evaluated, team: IntArray) -> bool:
         """Whether a team is proven; one that is refuted counts as colliding."""
         solution = self._planner.team_solution(self._problem, populations, team)
         proven = self._proofs.is_proven(solution)
@@ -337,7 +323,7 @@ class ProvenTeams:
             self._refute(found, team, self._proofs.touching_pair(solution))
         return proven
 
-    def _refute(self, found: Evaluated, team: IntArray, bodies: str) -> None:
+    def _refute(self, found: kernels.Evaluated, team: IntArray, bodies: str) -> None:
         """Count one more collision of the robots that touch, or of all if none are named."""
         own = [self._robots[name] for name in bodies.split(PAIR)] if bodies else []
         touching = sorted({robot for robot in own if robot >= 0})
@@ -352,7 +338,7 @@ class ProvenTeams:
                 self._raise(found, a, team, 1)
                 self._raise(found, b, team, 1)
 
-    def _raise(self, found: Evaluated, robot: int, team: IntArray, hits: int) -> None:
+    def _raise(self, found: kernels.Evaluated, robot: int, team: IntArray, hits: int) -> None:
         """Raise C1 of a team's member, and its cost with it."""
         found.criteria[robot, 0, team[robot]] += hits
         found.costs[robot, team[robot]] += self._planner.objective.collision_weight * hits

@@ -10,7 +10,7 @@ import numpy as np
 
 from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
 from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
-from evoexp.evolution.operators.breeding import Breeding
+from evoexp.evolution.operators.operator import Breeding
 from evoexp.evolution.succession import choose_elites, cost_statistics, pareto_front
 from evoexp.evolution.teams import (
     BestTeam,

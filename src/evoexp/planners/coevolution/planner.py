@@ -24,17 +24,10 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
-from evoexp.planners.answers import in_shape, of_limits, of_place
+from evoexp.planners.answers import Acceptance, in_shape, of_limits, of_place
+from evoexp.planners.coevolution import kernels
 from evoexp.planners.coevolution.generations import CoevolutionSettings, ProvenTeams, TeamSearch
-from evoexp.planners.coevolution.kernels import (
-    HALF_TURN,
-    Evaluated,
-    LineTask,
-    count_crossings,
-    measure,
-)
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
-from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.motion_tasks import LinkMotion
@@ -179,22 +172,22 @@ class Coevolution(PlannerDefaults, Component):
 
     def populations_of(self, problem: Problem, uniforms: FloatArray) -> FloatArray:
         """Return the populations of uniform numbers of their shape, see `sample`."""
-        genes = HALF_TURN * uniforms
+        genes = kernels.HALF_TURN * uniforms
         for robot in np.flatnonzero(~problem.moving):
             genes[robot] = np.tile(problem.start[robot], self.num_configurations)[:, None]
         return genes
 
-    def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
+    def evaluated(self, problem: Problem, populations: FloatArray) -> kernels.Evaluated:
         """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
         collision, (robots, _, count) = problem.collision, populations.shape
         weights = self.objective.own_weights, self.objective.collision_weight
         envelope = self.collision.half_width, self.collision.tcp_radius
-        task = LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
-        found = Evaluated.room(robots, count)
+        task = kernels.LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
+        found = kernels.Evaluated.room(robots, count)
         # paths, and C2 … C4 (Eqs. 6–8)
         shape, is_lines = (robots, self.num_configurations + 2), collision.is_lines
         paths, outlines = np.empty((*shape, 2, count)), np.empty((*shape, 4, count))
-        measure(populations, task, paths, outlines, found.criteria, found.own)
+        kernels.measure(populations, task, paths, outlines, found.criteria, found.own)
         # C1 (Eqs. 4, 5)
         if not is_lines:
             tested = [collision.tested(path) for path in paths]
@@ -202,7 +195,7 @@ class Coevolution(PlannerDefaults, Component):
             arms = zip(collision.arms, tested, strict=True)
             outlines = np.array([arm.outlines(q) for arm, q in arms])
         fits = outlines.shape[1] <= MOST_CONFIGURATIONS
-        if not (fits and count_crossings(outlines, int(is_lines), task, found)):
+        if not (fits and kernels.count_crossings(outlines, int(is_lines), task, found)):
             raise ValueError(REFUSED)
         return found
 
@@ -261,7 +254,9 @@ class Coevolution(PlannerDefaults, Component):
         least, greatest = (joint_ranges(curve)[:, k].reshape(-1, 2) / DEGREE for k in range(2))
         turns = top_speeds(curve).reshape(-1, 2) / DEGREE
         for r in range(len(turns)):
-            beyond = max(0.0, -float(least[r].min()), float(greatest[r].max()) - HALF_TURN / DEGREE)
+            beyond = max(
+                0.0, -float(least[r].min()), float(greatest[r].max()) - kernels.HALF_TURN / DEGREE
+            )
             terms[f"out_of_range_robot_{r + 1}_deg"] = beyond
             terms[f"fastest_turn_robot_{r + 1}_deg"] = float(turns[r].max())
         return terms
@@ -273,7 +268,7 @@ class Coevolution(PlannerDefaults, Component):
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start and goal of every robot with the task's, and links with [0, π]."""
         paths, found = self._paths(problem, solution), []
-        limits = np.array([[0.0, HALF_TURN / DEGREE]] * 2)
+        limits = np.array([[0.0, kernels.HALF_TURN / DEGREE]] * 2)
         for r, path in enumerate(paths):
             robot = f"robot {r + 1}"
             for end, k, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):

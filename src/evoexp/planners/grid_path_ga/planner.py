@@ -19,37 +19,15 @@ from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Part, Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.operators.breeding import ScaledGenetic
+from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
-from evoexp.paths.grids import (
-    LANES,
-    UNREACHED,
-    WORDS,
-    Grid,
-    Moves,
-    NodeArray,
-    SumArray,
-    spread_front,
-    walk,
-    walk_all,
-    weigh_all,
-)
+from evoexp.paths import grids
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import Acceptance
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels
-from evoexp.planners.grid_path_ga.kernels import (
-    COST,
-    DISTANCE,
-    RESULTS,
-    UNSAFENESS,
-    PathTable,
-    Population,
-    named_terms,
-    solution_of,
-)
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
-from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
 from evoexp.robots.mobile_robots import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -90,8 +68,10 @@ class Problem(NamedTuple):
     """Robot and scenario, prepared for the search."""
 
     fields: Fields  # grid, unsafeness, potentials
-    moves: Moves  # the moves of walks to the goal, and their weights
-    sums: SumArray  # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
+    moves: grids.Moves  # the moves of walks to the goal, and their weights
+    sums: (
+        grids.SumArray
+    )  # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
     ends: tuple[int, int]  # indices of start and goal
     world: World  # grid and fields, as the kernels take them
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
@@ -135,21 +115,21 @@ class GridPathGa(PlannerDefaults, Component):
         if len(problem.sums):
             # walkers fill the table, from the start with more words if some lack
             fewest = int(moves.steps[ends[0]])
-            first = WORDS * (int(STEPS_PER_WALK * count * fewest / LANES) + 1)
+            first = grids.WORDS * (int(STEPS_PER_WALK * count * fewest / grids.LANES) + 1)
             walks = first, MORE_WORDS, moves.neighbours, problem.sums, ends, not self.revisits
             words = rng.bit_generator.random_raw(first)
-            while walk_all(words, *walks, paths) < 0:
+            while grids.walk_all(words, *walks, paths) < 0:
                 words = np.concatenate([words, rng.bit_generator.random_raw(MORE_WORDS)])
             return trimmed(paths)
         draws, place = Draws(BLOCK), np.zeros(nodes, dtype=np.int32)
         task = moves, problem.world.sums[:0], ends, not self.revisits
         for path in paths:
             before = draws.block.taken.item(0)
-            walk(draws.block, *task, path, place)
+            grids.walk(draws.block, *task, path, place)
             while used_up(draws.block):
                 draws.block.taken[0], before = before, 0
                 draws.extend(rng)
-                walk(draws.block, *task, path, place)
+                grids.walk(draws.block, *task, path, place)
         return trimmed(paths)
 
     def cost(self, problem: Problem, population: np.ndarray) -> JudgementArrays:
@@ -161,15 +141,15 @@ class GridPathGa(PlannerDefaults, Component):
         terms = {"distance": distance, "unsafeness": unsafeness, "num_nodes": population[:, 0]}
         return JudgementArrays(cost, np.isfinite(cost), 0, terms)
 
-    def measured(self, problem: Problem, paths: NodeArray) -> FloatArray:
+    def measured(self, problem: Problem, paths: grids.NodeArray) -> FloatArray:
         """Return lengths, mean unsafenesses and costs of paths, (3, individuals)."""
-        results = np.empty((RESULTS, len(paths)))
+        results = np.empty((kernels.RESULTS, len(paths)))
         kernels.measure_all(paths, problem.world, self.objective.weights, results)
         return results
 
     def solution(self, problem: Problem, population: np.ndarray, individual: int) -> FloatArray:
         """Return a path as a flat solution."""
-        return solution_of(population[individual], problem.world)
+        return kernels.solution_of(population[individual], problem.world)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: from node to node in equal times."""
@@ -195,14 +175,14 @@ class GridPathGa(PlannerDefaults, Component):
             (path[1] != problem.ends[0]) + (path[-1] != problem.ends[1]),
         )
         faults = dict(zip(FAULTS, map(float, counts), strict=True))
-        results = np.full((RESULTS, 1), np.inf)
+        results = np.full((kernels.RESULTS, 1), np.inf)
         if made.all():
             kernels.measure(path, problem.world, self.objective.weights, results, 0)
         else:
-            results[DISTANCE] = np.sqrt(((nodes[1:] - nodes[:-1]) ** 2).sum(axis=1)).sum()
-            results[UNSAFENESS] = problem.fields.unsafeness[path[1:]].mean()
-        cost = np.inf if any(faults.values()) else float(results[COST, 0])
-        return named_terms(results[:, 0], len(nodes)) | faults | {"cost": cost}
+            results[kernels.DISTANCE] = np.sqrt(((nodes[1:] - nodes[:-1]) ** 2).sum(axis=1)).sum()
+            results[kernels.UNSAFENESS] = problem.fields.unsafeness[path[1:]].mean()
+        cost = np.inf if any(faults.values()) else float(results[kernels.COST, 0])
+        return kernels.named_terms(results[:, 0], len(nodes)) | faults | {"cost": cost}
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Name the faults that `evaluate` counts: ends, blocked nodes, forbidden moves."""
@@ -223,16 +203,15 @@ class GridPathGa(PlannerDefaults, Component):
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
 
 
-class _Search(PathTable, ScaledSearch):
-    """One run, and memory for its kernels."""
-
+class _Search(kernels.PathTable, ScaledSearch):
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
         ScaledSearch.__init__(self, ga, PER_CALL, BLOCK)
         self.make_table(problem.world, size)
         self._planner, self._problem = planner, problem
-        self.table = Population(
-            np.empty((KEPT, size, nodes + 1), dtype=np.int32), np.empty((KEPT, RESULTS, size))
+        self.table = kernels.Population(
+            np.empty((KEPT, size, nodes + 1), dtype=np.int32),
+            np.empty((KEPT, kernels.RESULTS, size)),
         )
         breeding = Breeding(
             not planner.revisits,
@@ -251,21 +230,21 @@ class _Search(PathTable, ScaledSearch):
         results[:] = self._planner.measured(self._problem, paths)
         self.note(present, 0)
 
-    def breed(self, present: Population, following: Population) -> bool:
+    def breed(self, present: kernels.Population, following: kernels.Population) -> bool:
         rules, populations = self._settings, (present, following)
         task = self.draws.block, self._problem.world
         return bool(kernels.advance(*task, *rules, *populations, self._scratch))
 
-    def note(self, population: Population, place: int) -> None:
+    def note(self, population: kernels.Population, place: int) -> None:
         kernels.note(population, place, self.recorded, self.summaries)
 
-    def population(self, index: int) -> NodeArray:
+    def population(self, index: int) -> grids.NodeArray:
         """Return the paths of one of the generations computed last, without rests of rows."""
-        paths: NodeArray = self.at(index).paths
+        paths: grids.NodeArray = self.at(index).paths
         return trimmed(paths) if index > self.reached - KEPT else paths[:0]
 
 
-def trimmed(paths: NodeArray) -> NodeArray:
+def trimmed(paths: grids.NodeArray) -> grids.NodeArray:
     """Return a copy of paths as wide as the longest one; zeros stand behind the others."""
     width = int(paths[:, 0].max()) + 1
     return np.where(np.arange(width) <= paths[:, :1], paths[:, :width], np.int32(0))
@@ -295,7 +274,7 @@ def _prepared(
             must += f"({collision.max_unsafeness:g})"
             raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
     steps = fields.steps_to(goal)
-    if steps[start] == UNREACHED:
+    if steps[start] == grids.UNREACHED:
         must = f"a node that can be reached from the start {list(scenario.start)}; "
         must += f"{between} are between"
         raise SettingError("scenario.goal", must, list(scenario.goal))
@@ -308,16 +287,16 @@ def _prepared(
         fields.potentials,
         _weigh_moves(fields),
     )
-    moves = Moves(own.neighbours, fields.potentials, steps)
+    moves = grids.Moves(own.neighbours, fields.potentials, steps)
     # toward the goal; walkers take turns on grids of few nodes whose sums are small whole numbers
-    exact = weigh_all(moves)
+    exact = grids.weigh_all(moves)
     sums = np.minimum(exact, MOST_WEIGHT).astype(np.uint16)
     if len(sums) > MOST_NODES or (sums != exact).any():
         sums = sums[:0]
     return Problem(fields, moves, sums, (start, goal), world, bodies, margin)
 
 
-def _weigh_moves(fields: Fields) -> SumArray:
+def _weigh_moves(fields: Fields) -> grids.SumArray:
     """Return `weigh_all` toward every node; none of large grids, or where 8 bits hold no sum."""
     grid, potentials = fields.grid, fields.potentials
     nodes, moves = grid.neighbours.shape
@@ -325,22 +304,24 @@ def _weigh_moves(fields: Fields) -> SumArray:
     steps, queue = (np.empty(nodes, dtype=np.int32) for _ in range(2))
     for node, table in enumerate(tables):
         source = np.array([node], dtype=np.int32)
-        spread_front(grid.neighbours, fields.num_moves, source, steps, queue)
-        sums = weigh_all(Moves(grid.neighbours, potentials, steps))
+        grids.spread_front(grid.neighbours, fields.num_moves, source, steps, queue)
+        sums = grids.weigh_all(grids.Moves(grid.neighbours, potentials, steps))
         table[:] = sums
         if not np.array_equal(table, sums):
             return tables[:0]
     return tables
 
 
-def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: bool) -> Grid:
+def only_proven(
+    grid: grids.Grid, scene: Scene, security_margin: float, by_margin: bool
+) -> grids.Grid:
     """Return a grid without the moves that the certifier does not prove, in either direction.
 
     A length unit lies between its nodes. With `by_margin` moves must keep the security margin.
     """
     neighbours = grid.neighbours.copy()
 
-    def judge(line: NodeArray, move: int) -> None:
+    def judge(line: grids.NodeArray, move: int) -> None:
         """Forbid the moves of a line of nodes that are not proven."""
         ends = Motion(grid.coordinates[line[[0, -1]]].astype(np.float64))
         if is_proven((Part(scene, 0, 1),), ends, security_margin, by_margin):
@@ -362,7 +343,7 @@ def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: boo
     return grid._replace(neighbours=neighbours)
 
 
-def _lines(targets: NodeArray) -> Iterator[NodeArray]:
+def _lines(targets: grids.NodeArray) -> Iterator[grids.NodeArray]:
     """Yield the nodes of each longest line of one move, which leads to `targets` (nodes,) or −1."""
     is_target = np.zeros(len(targets), dtype=bool)
     is_target[targets[targets >= 0]] = True

@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.operators.breeding import ScaledGenetic
+from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.evolution.succession import choose_parents, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE, log
@@ -35,10 +35,9 @@ from evoexp.objectives.placement_criteria import (
     measure_postures,
 )
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape, of_limits
+from evoexp.planners.answers import Acceptance, in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
-from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_robots import MobileArm
@@ -302,8 +301,6 @@ class PlacementGa(PlannerDefaults, Component):
 
 
 class _Search(ScaledSearch):
-    """One run, and memory for its kernels."""
-
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
         ga, size = planner.ga, planner.ga.population_size
         super().__init__(ga, PER_CALL, BLOCK)

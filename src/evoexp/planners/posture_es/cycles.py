@@ -203,7 +203,6 @@ class Search:
 
     @property
     def _stop_reason(self) -> str:
-        """The reason for which the phase ends; nothing while it goes on."""
         if self._won:
             return "goal"
         if self._idle >= self._ga.patience:

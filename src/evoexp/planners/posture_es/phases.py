@@ -13,23 +13,15 @@ import pinocchio as pin
 from evoexp.collision.bodies.body_models import BodyModel, Carried
 from evoexp.collision.covers.body_covers import Cover
 from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
-from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.ordered_sums import rotation_matrix
+from evoexp.numeric.elementary import DEGREE, rotation_matrix
 from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim, PostureCost
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import IDENTITY, compose, frame_pose, invert, pose_of
+from evoexp.scenarios import posture_task
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, obstacle_hulls
-from evoexp.scenarios.posture_task import (
-    Phase,
-    PlaceGoal,
-    PoseGoal,
-    PostureTask,
-    ShiftGoal,
-    SurfaceGoal,
-)
 
 TOOL_UP, OBJECT_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 KEPT = 64  # stages and scenes that a problem keeps
@@ -61,7 +53,7 @@ class Stage(NamedTuple):
     """One phase, begun."""
 
     number: int  # of the phase, from 0
-    phase: Phase  # the phase
+    phase: posture_task.Phase  # the phase
     situation: Situation  # the places of all objects in it
     # index into the kinematic table, and local pose (12,), of the frame that is controlled
     controlled: tuple[int, FloatArray]
@@ -96,14 +88,14 @@ class Problem:
 
     assembly: Assembly  # the robot, built
     bodies: BodyModel  # its bodies, covered
-    task: PostureTask  # the scenario
+    task: posture_task.PostureTask  # the scenario
     obstacles: ObstacleTable  # the obstacles at the start
     # covers of the objects that are grasped, by index, in their own frames, and shapes inside
     # them
     covers: dict[int, tuple[Cover, Cover]]
     # index into the kinematic table of the joint that moves the tool; its local pose (12,)
     tool: tuple[int, FloatArray]
-    phases: tuple[Phase, ...]  # the phases of the task, subgoals included
+    phases: tuple[posture_task.Phase, ...]  # the phases of the task, subgoals included
     weights: FloatArray  # (phases, terms) of the cost
     objective: PostureCost  # the cost
     start: FloatArray  # (nq,) [rad]
@@ -115,7 +107,7 @@ class Problem:
     def begin(self, index: int, q: FloatArray, situation: Situation) -> Stage:
         """Begin a phase at posture q (nq,); stages are kept, verdict and terms need them again."""
         phase, (joint, local) = self.phases[index], self.tool
-        place = q.tobytes() if isinstance(phase.goal, ShiftGoal) else b""
+        place = q.tobytes() if isinstance(phase.goal, posture_task.ShiftGoal) else b""
         key = index, situation.held, situation.poses.tobytes(), situation.grasp.tobytes(), place
         if key in self.memory:
             stage: Stage = self.memory[key]
@@ -241,7 +233,7 @@ class Problem:
         return self.task.allowed_penetration or 0.0
 
     def surroundings(
-        self, phase: Phase, situation: Situation
+        self, phase: posture_task.Phase, situation: Situation
     ) -> tuple[ObstacleTable, tuple[tuple[int, int], ...], Carried | None]:
         """Return the obstacles, the pairs (body, obstacle) that may touch, the carried object."""
         names, bodies, held = self.task.names, self.bodies.names, situation.held
@@ -268,13 +260,12 @@ class Problem:
 
     @property
     def _moving(self) -> list[int]:
-        """The bodies that a joint moves."""
         items = self.assembly.geometry.geometryObjects
         return [k for k, item in enumerate(items) if item.parentJoint > 0]
 
     def aim(
         self,
-        phase: Phase,
+        phase: posture_task.Phase,
         q: FloatArray,
         situation: Situation,
         controlled: tuple[int, FloatArray],
@@ -284,14 +275,14 @@ class Problem:
         up = up / np.sqrt(np.sum(up * up))
         own_up = OBJECT_UP if situation.held >= 0 else TOOL_UP
         turn, zero = IDENTITY[:9].copy(), np.zeros(3)
-        if isinstance(goal, ShiftGoal):
+        if isinstance(goal, posture_task.ShiftGoal):
             table = self.assembly.table
             now, way = frame_pose(table, *controlled, q), np.array(goal.offset, dtype=np.float64)
             if goal.frame == "tool":
                 tool = frame_pose(table, *self.tool, q)
                 way = compose(tool, np.concatenate([turn, way]))[9:] - tool[9:]
             return Aim(now[:9].copy(), now[9:] + way, zero, POINT, 0.0, 0.0, zero, up, own_up)
-        if isinstance(goal, SurfaceGoal):
+        if isinstance(goal, posture_task.SurfaceGoal):
             k = self.task.names.index(goal.object)
             pose, kind, size = situation.poses[k], self.obstacles.kind[k], self.obstacles.size[k]
             place = pose[:9].copy(), pose[9:].copy(), pose[[2, 5, 8]]
@@ -300,10 +291,10 @@ class Problem:
             surface = ROUND if kind == CYLINDER else ROD
             return Aim(*place, surface, float(size[1]), float(size[0]), zero, up, own_up)
         point = np.array(goal.point, dtype=np.float64)
-        if isinstance(goal, PoseGoal):
+        if isinstance(goal, posture_task.PoseGoal):
             turn = np.array(rotation_matrix(goal.rotation), dtype=np.float64).ravel()
             return Aim(turn, point, zero, POINT, 0.0, 0.0, zero, up, own_up)
-        if isinstance(goal, PlaceGoal):
+        if isinstance(goal, posture_task.PlaceGoal):
             return Aim(turn, point, up, ROUND, 0.0, goal.radius, zero, up, own_up)
         surface = ROD if goal.radius > 0.0 else POINT
         return Aim(turn, point, zero, surface, 0.0, goal.radius, zero, up, own_up)
@@ -322,7 +313,7 @@ class Problem:
         ]
 
 
-def _are_among(phase: Phase, one: str, two: str) -> bool:
+def _are_among(phase: posture_task.Phase, one: str, two: str) -> bool:
     return any({one, two} == set(pair) for pair in phase.contacts)
 
 

@@ -26,14 +26,13 @@ from evoexp.collision.scene import Part
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape, Listing, in_shape, of_postures
+from evoexp.planners.answers import Acceptance, CoverShape, Listing, Proofs, in_shape, of_postures
 from evoexp.planners.arm_tasks import cover_shapes, hull_notes
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults
 from evoexp.planners.posture_es.cycles import Search, StrategySettings, named, path_terms
 from evoexp.planners.posture_es.kernels import COST
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.planners.posture_es.problem import prepare
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.moveit import MoveitTask

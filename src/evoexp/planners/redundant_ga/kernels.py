@@ -16,7 +16,7 @@ from evoexp.collision.planar.link_ellipses import (
     check_paths,
     prepare_checks,
 )
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
+from evoexp.evolution.operators.operator import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.vectors import LANES, load, root, select, spread, store

@@ -23,7 +23,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape, of_postures
+from evoexp.planners.answers import Acceptance, Proofs, in_shape, of_postures
 from evoexp.planners.planner import (
     COPIES,
     JudgementArrays,
@@ -31,18 +31,9 @@ from evoexp.planners.planner import (
     WrappedPlanner,
     num_values,
 )
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
-from evoexp.planners.redundant_ga import kernels
+from evoexp.planners.redundant_ga import kernels, sub_path
 from evoexp.planners.redundant_ga.kernels import Judging, judge_paths
-from evoexp.planners.redundant_ga.sub_path import (
-    TERMS,
-    BinaryGenetic,
-    DrawnSearch,
-    RealGenetic,
-    Search,
-    SelectiveSettings,
-)
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_ends import PlanarArm, bring_tip_to
@@ -78,7 +69,7 @@ class RedundantGa(PlannerDefaults, Component):
     # A sub-path is successful below its stopping cost (`threshold`), or if its cost is
     # `finite`
     success: Literal["threshold", "finite"]
-    ga: SelectiveSettings  # population, generations, operators
+    ga: sub_path.SelectiveSettings  # population, generations, operators
     objective: Reaching  # weights of Eq. 4
     collision: LinkEllipses  # positions and chords that are tested
     # which ends of sub-paths may be the best one: those that the model accepts, or those of
@@ -87,12 +78,15 @@ class RedundantGa(PlannerDefaults, Component):
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
         """Build the robot and check that the start fits it and is free of collision."""
-        if not isinstance(self.ga, RealGenetic | BinaryGenetic):
+        if not isinstance(self.ga, sub_path.RealGenetic | sub_path.BinaryGenetic):
             raise SettingError("ga", "a real_genetic or a binary_genetic", self.ga.component)
         return reaching_problem(robot, scenario, self.collision)
 
     def evolve(
-        self, problem: Problem, rng: np.random.Generator, kind: type[Search] = Search
+        self,
+        problem: Problem,
+        rng: np.random.Generator,
+        kind: type[sub_path.Search] = sub_path.Search,
     ) -> Iterator[Block]:
         """Yield the generations of SP1 and SP2 in turn, until both are successful."""
         search = kind(self, problem, rng)
@@ -127,7 +121,7 @@ class RedundantGa(PlannerDefaults, Component):
         first, second = np.ascontiguousarray(population)
         via = judge_paths(starts, first, self.judging(problem, 0))
         goal = judge_paths(first, second, self.judging(problem, 1))
-        named = dict(zip(TERMS, (*via, *goal), strict=True))
+        named = dict(zip(sub_path.TERMS, (*via, *goal), strict=True))
         cost = np.where(self.successful(0, named["of_sp1"]), named["of_sp2"], np.inf)
         if self.answers_are_proven:
             Proofs(self, problem).settle(cost, lambda k: self.solution(problem, population, k))
@@ -154,7 +148,7 @@ class RedundantGa(PlannerDefaults, Component):
         """
         postures = self._postures(problem, solution)
         terms = self.judge_plan(problem, solution)
-        named = dict(zip(TERMS, terms.ravel().tolist(), strict=True))
+        named = dict(zip(sub_path.TERMS, terms.ravel().tolist(), strict=True))
         for k in range(2):
             contact = problem.collision.contact(*postures[k : k + 2]) or (0, 0, 0, False)
             for name, value in zip(CONTACT, contact, strict=True):
@@ -179,7 +173,7 @@ class RedundantGa(PlannerDefaults, Component):
     def memory(self, problem: Problem) -> int:
         """Return the memory of the postures of a search, coded in bits if they are."""
         ga = self.ga
-        coded = 2 * ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 0
+        coded = 2 * ga.bits_per_gene if isinstance(ga, sub_path.BinaryGenetic) else 0
         return 8 * (COPIES + coded) * num_values(self.shape(problem)) * ga.population_size
 
     def shape(self, problem: Problem) -> tuple[tuple[int], ...]:
@@ -199,7 +193,7 @@ class SequentialSearch(WrappedPlanner):
 
     component: ClassVar[str] = "sequential_search"
 
-    search: ClassVar[type[DrawnSearch]] = DrawnSearch
+    search: ClassVar[type[sub_path.DrawnSearch]] = sub_path.DrawnSearch
 
     planner: RedundantGa  # the planner whose loop, sampling and budget are used
 
@@ -226,14 +220,14 @@ def bring_tips_to(ends: FloatArray, target: FloatArray, limits: FloatArray, arm:
         ends[:, k] = q
 
 
-class DescendingSearch(DrawnSearch):
+class DescendingSearch(sub_path.DrawnSearch):
     """Draws postures between the start p of the sub-path and uniform ones, and moves their tips."""
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population; see `Search`."""
         self._descend(rng.random(self._num_genes * self._ga.population_size), 0)
         self.states = [state_bytes(rng.bit_generator)]
-        self.end = super(DrawnSearch, self)._best_end(0)
+        self.end = super(sub_path.DrawnSearch, self)._best_end(0)
 
     def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Compute one generation; see `Search`."""
@@ -263,11 +257,11 @@ class InverseKinematics(SequentialSearch):
     """
 
     component: ClassVar[str] = "inverse_kinematics"
-    search: ClassVar[type[DrawnSearch]] = DescendingSearch
+    search: ClassVar[type[sub_path.DrawnSearch]] = DescendingSearch
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Any:
         """Prepare the planner's problem; a SettingError refuses genes that are no joint angles."""
-        if not isinstance(self.planner.ga, RealGenetic):
+        if not isinstance(self.planner.ga, sub_path.RealGenetic):
             must = "a real_genetic, whose genes are joint angles"
             raise SettingError("ga", must, self.planner.ga.component)
         return super().prepare(robot, scenario)

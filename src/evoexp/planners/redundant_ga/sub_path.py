@@ -9,27 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 import numpy as np
 from pydantic import Field
 
-from evoexp.evolution.operators.breeding import Operators, PopulationSettings
-from evoexp.evolution.operators.crossover import (
-    ArithmeticCrossover,
-    BlxAlpha,
-    OnePoint,
-    UniformCrossover,
+from evoexp.evolution.operators import crossover, mutation
+from evoexp.evolution.operators.operator import (
+    Crossover,
+    Genome,
+    Mutation,
+    Named,
+    Operators,
+    PopulationSettings,
+    Selection,
 )
-from evoexp.evolution.operators.mutation import (
-    BitFlips,
-    GaussianMutation,
-    NonUniformMutation,
-    UniformReset,
-)
-from evoexp.evolution.operators.operator import Crossover, Genome, Mutation, Named, Selection
 from evoexp.evolution.operators.selection import InverseRoulette, LinearRanking, Tournament
 from evoexp.evolution.succession import summarise
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
+from evoexp.planners.answers import Proofs
 from evoexp.planners.driver import GeneticSearch, generations_per_call
 from evoexp.planners.planner import Candidate
-from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, SubPath
@@ -90,18 +86,20 @@ class RealGenetic(SelectiveSettings):
         """The operators of a search."""
         one_gene = self.mutation_scope == "individual"
         named: dict[Any, Any] = {
-            "one_point": OnePoint(),
-            "uniform": UniformCrossover(),
-            "arithmetic": ArithmeticCrossover(),
-            "blx_alpha": BlxAlpha(blend_alpha=self.blend_alpha),
-            "non_uniform": NonUniformMutation(
+            "one_point": crossover.OnePoint(),
+            "uniform": crossover.UniformCrossover(),
+            "arithmetic": crossover.ArithmeticCrossover(),
+            "blx_alpha": crossover.BlxAlpha(blend_alpha=self.blend_alpha),
+            "non_uniform": mutation.NonUniformMutation(
                 one_gene=one_gene, mutation_power=self.mutation_power
             ),
-            "gaussian": GaussianMutation(one_gene=one_gene, mutation_std=self.mutation_std),
-            "uniform_reset": UniformReset(one_gene=one_gene),
+            "gaussian": mutation.GaussianMutation(
+                one_gene=one_gene, mutation_std=self.mutation_std
+            ),
+            "uniform_reset": mutation.UniformReset(one_gene=one_gene),
         }
-        crossover, mutation = (named.get(own, own) for own in (self.crossover, self.mutation))
-        return Operators(self.selection_operator, crossover, mutation)
+        chosen = (named.get(own, own) for own in (self.crossover, self.mutation))
+        return Operators(self.selection_operator, *chosen)
 
 
 class BinaryGenetic(SelectiveSettings):
@@ -118,7 +116,7 @@ class BinaryGenetic(SelectiveSettings):
     @property
     def operators(self) -> Operators:
         """The operators of a search."""
-        return Operators(self.selection_operator, OnePoint(), BitFlips())
+        return Operators(self.selection_operator, crossover.OnePoint(), mutation.BitFlips())
 
 
 if TYPE_CHECKING:

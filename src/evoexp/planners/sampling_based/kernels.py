@@ -71,7 +71,6 @@ def step_toward(q: FloatArray, target: FloatArray, step: float) -> FloatArray:
 
 @kernel
 def _num_parts(length: float, resolution: float) -> int:
-    """Return the number of equal parts into which tested configurations divide an edge."""
     return max(1, int(np.ceil(length / resolution - SLACK)))
 
 

@@ -17,10 +17,9 @@ from evoexp.errors import SettingError
 from evoexp.evolution.succession import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape
+from evoexp.planners.answers import Acceptance, Proofs, in_shape
 from evoexp.planners.arm_tasks import UNLIMITED, ArmDefaults, ArmProblem, ArmTask, arm_problem
 from evoexp.planners.planner import JudgementArrays, Keeper, PlannerDefaults
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.sampling_based.kernels import distance, lengths_along
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import Block, FloatArray

@@ -138,8 +138,6 @@ class _Search:
 
 
 class _Library:
-    """OMPL's objects for one run: space, motion tests, problem, and planner."""
-
     def __init__(
         self, planner: OmplPlanner, problem: ArmProblem, edges: EdgeTest, seed: int
     ) -> None:
@@ -241,5 +239,4 @@ def _function(kind: str, function: Callable[..., bool]) -> Any:
 
 
 def _array(state: Any, nq: int) -> FloatArray:
-    """Return a state of OMPL as an array (nq,)."""
     return np.array([state[joint] for joint in range(nq)])

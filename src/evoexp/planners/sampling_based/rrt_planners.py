@@ -14,18 +14,12 @@ import numpy as np
 from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.answers import of_postures
+from evoexp.planners.answers import Acceptance, Proofs, of_postures
 from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.planner import Candidate, JudgementArrays
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
+from evoexp.planners.sampling_based import node_paths
 from evoexp.planners.sampling_based.kernels import distance
-from evoexp.planners.sampling_based.node_paths import (
-    InIterations,
-    NodePaths,
-    judge_paths,
-    path_length,
-)
 from evoexp.planners.sampling_based.trees import EdgeTest, ShortenedPath, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
@@ -34,7 +28,7 @@ from evoexp.scenarios.motion_tasks import PickAndPlace
 from evoexp.validation import Component, Count, NonNegativeCount, Positive
 
 
-class RrtConnect(InIterations, NodePaths, Component):
+class RrtConnect(node_paths.InIterations, node_paths.NodePaths, Component):
     """RRT-Connect and shortcuts; the population is all nodes of both trees."""
 
     component: ClassVar[str] = "rrt_connect"
@@ -120,7 +114,6 @@ class _ConnectSearch:
                 self.best_cost, self._solution = path.length, path.nodes.flatten()
 
     def _is_done(self) -> bool:
-        """Whether the present start has come to its end."""
         if self._path is not None:
             return self._path.num_attempts >= self._planner.num_improvements
         return self.pair.num_iterations >= self._planner.max_iterations
@@ -130,7 +123,7 @@ CLOSE = 1e-6  # [-] of the arm's length, by which the tip may miss a place
 PLACES = "via point", "goal point"
 
 
-class RrtReaching(InIterations, Component):
+class RrtReaching(node_paths.InIterations, Component):
     """RRT-Connect to postures that reach the via point, and then to some that reach the goal.
 
     Postures whose tip is at either point are found from random ones by damped least squares; the
@@ -178,7 +171,7 @@ class RrtReaching(InIterations, Component):
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge paths (joints, postures, individuals) [rad]: length [deg], inf in collision."""
         edges = EdgeTest(problem.collision, self.resolution)
-        return judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
+        return node_paths.judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return length and contacts of a path, and how near its postures come to both places."""
@@ -243,7 +236,7 @@ class _ReachingSearch:
                 nodes = None if nodes is None else (yield from self._extended(rng, nodes, target))
             if nodes is None:
                 continue
-            length, plan = path_length(nodes), np.ascontiguousarray(DEGREE * nodes)
+            length, plan = node_paths.path_length(nodes), np.ascontiguousarray(DEGREE * nodes)
             self._plans += 1
             shorter = length < self.best_cost
             if shorter and (self._proofs is None or self._proofs.is_proven(plan.ravel())):

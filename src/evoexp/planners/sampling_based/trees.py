@@ -10,15 +10,8 @@ import numpy as np
 
 from evoexp.collision.bodies.covered_bodies import ArmCollision
 from evoexp.collision.planar.link_ellipses import EllipseCollision
-from evoexp.planners.proofs import Proofs
-from evoexp.planners.sampling_based.kernels import (
-    Trees,
-    edge_is_free,
-    grow,
-    lengths_along,
-    shortcuts,
-    tested_configurations,
-)
+from evoexp.planners.answers import Proofs
+from evoexp.planners.sampling_based import kernels
 from evoexp.records import FloatArray
 
 CUT = 0.25  # [-] of a segment, from a corner to where it is cut
@@ -42,7 +35,7 @@ class EdgeTest:
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
         """Whether an edge is free at the configurations tested; its first end is known to be."""
-        is_free, asked = edge_is_free(*self.test, one, two, self.resolution)
+        is_free, asked = kernels.edge_is_free(*self.test, one, two, self.resolution)
         self.queries += asked
         return bool(is_free)
 
@@ -74,7 +67,7 @@ class EdgeTest:
     def num_contacts(self, path: FloatArray) -> int:
         """Return how many of the configurations tested on a path (nodes, nq) collide."""
         edges = itertools.pairwise(path)
-        tested = [tested_configurations(one, two, self.resolution) for one, two in edges]
+        tested = [kernels.tested_configurations(one, two, self.resolution) for one, two in edges]
         if not tested:
             return 0
         q = np.concatenate(tested, axis=1)
@@ -90,7 +83,7 @@ class TreePair:
         self._edges, self._step, self.num_iterations = edges, step, 0
         nodes, parents = np.empty((2, len(start), ROOM)), np.full((2, ROOM), -1)
         nodes[:, :, 0] = start, goal
-        self._trees = Trees(nodes, parents, np.ones(2, dtype=np.int64))
+        self._trees = kernels.Trees(nodes, parents, np.ones(2, dtype=np.int64))
 
     @property
     def nodes(self) -> FloatArray:
@@ -108,7 +101,7 @@ class TreePair:
         turn = self.num_iterations % 2
         self.num_iterations += 1
         edges = self._edges
-        self._trees, end, met, asked = grow(
+        self._trees, end, met, asked = kernels.grow(
             *edges.test, self._trees, turn, target, self._step, edges.resolution
         )
         edges.queries += asked
@@ -126,7 +119,6 @@ class TreePair:
         return None
 
     def _branch(self, tree: int, index: int) -> FloatArray:
-        """Return the nodes from a tree's root to a node, (nodes, nq)."""
         branch = []
         while index >= 0:
             branch.append(index)
@@ -161,7 +153,7 @@ class ShortenedPath:
 
     def __init__(self, nodes: FloatArray, edges: EdgeTest) -> None:
         """Begin with a path (nodes, nq) that is free."""
-        self.nodes, self.lengths = nodes, lengths_along(nodes)
+        self.nodes, self.lengths = nodes, kernels.lengths_along(nodes)
         self._edges, self.num_attempts = edges, 0
         self._before: list[FloatArray] = []  # the paths since the last one that was judged
 
@@ -174,7 +166,7 @@ class ShortenedPath:
         """Go back to the last path that is proven, if the one in hand is not."""
         while self._before and self._edges.unproven(self.nodes) is not None:
             self.nodes = self._before.pop()
-        self._before, self.lengths = [], lengths_along(self.nodes)
+        self._before, self.lengths = [], kernels.lengths_along(self.nodes)
 
     def improve(self, num_shortcuts: int, rng: np.random.Generator, most: int) -> FloatArray:
         """Try some shortcuts, `most` at most, or cut the corners where all were tried.
@@ -190,12 +182,14 @@ class ShortenedPath:
     def attempt(self, uniforms: FloatArray) -> FloatArray:
         """Try lines between shares (attempts, 2) of the path; return its length after each."""
         edges = self._edges
-        nodes, sizes, after, asked = shortcuts(*edges.test, self.nodes, uniforms, edges.resolution)
+        nodes, sizes, after, asked = kernels.shortcuts(
+            *edges.test, self.nodes, uniforms, edges.resolution
+        )
         edges.queries += asked
         for path in np.split(nodes, np.cumsum(sizes)[:-1]) if len(sizes) else []:
             self._before.append(self.nodes)
             self.nodes = path
-        self.lengths = lengths_along(self.nodes)
+        self.lengths = kernels.lengths_along(self.nodes)
         self.num_attempts += len(uniforms)
         return after
 
@@ -212,7 +206,7 @@ class ShortenedPath:
         tested |= {a.tobytes() + b.tobytes() for a, b in itertools.pairwise(nodes)}
         edges = itertools.pairwise(found)
         left = [(a, b) for a, b in edges if a.tobytes() + b.tobytes() not in tested]
-        lengths = lengths_along(found)
+        lengths = kernels.lengths_along(found)
         if lengths[-1] < self.length and all(self._edges.is_free(a, b) for a, b in left):
             self._before.append(self.nodes)
             self.nodes, self.lengths = found, lengths

@@ -17,12 +17,12 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import Acceptance, Proofs
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import PlannerDefaults
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Best, Block, FloatArray
 from evoexp.robots.mobile_robots import ARM_JOINTS, FloorManipulator
 from evoexp.scenarios.motion_tasks import Mission
@@ -72,7 +72,6 @@ class TwoStage(PlannerDefaults, Component):
         yield from self._drive(problem, rng, docked)
 
     def _place(self, problem: Problem, rng: np.random.Generator) -> Generator[Block, None, Block]:
-        """Search the docking posture; return the placement search's last block."""
         no_path, start = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, problem.scenario.grid.start
         for block in self.placement.evolve(problem.placement, rng):
             bests = []
@@ -84,7 +83,6 @@ class TwoStage(PlannerDefaults, Component):
         return block
 
     def _drive(self, problem: Problem, rng: np.random.Generator, placed: Block) -> Iterator[Block]:
-        """Search the path to the docking place that was found."""
         docked = placed.bests[-1]
         posture = self._posture_terms(problem, docked.solution) | {"sub_path": 2.0}
         path_problem = self._path_problem(problem, docked.solution)
@@ -125,7 +123,6 @@ class TwoStage(PlannerDefaults, Component):
 
     @property
     def _driving(self) -> GridPathGa:
-        """The planner of the path, which may be asked for proofs of its moves."""
         if not self.answers_are_proven:
             return self.path
         return self.path.model_copy(update={"acceptance": self.acceptance})

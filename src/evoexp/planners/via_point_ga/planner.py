@@ -18,15 +18,14 @@ from pydantic import Field, model_validator
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
-from evoexp.evolution.operators.breeding import GeneticSettings, Operators
+from evoexp.evolution.operators.operator import GeneticSettings, Operators
 from evoexp.evolution.operators.selection import FitnessRoulette
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringFitness
+from evoexp.objectives.motion_criteria import StringFitness
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import in_shape
+from evoexp.planners.answers import Acceptance, Proofs, in_shape
 from evoexp.planners.arm_tasks import ArmDefaults, ArmTask, arm_problem
 from evoexp.planners.planner import COPIES, JudgementArrays, num_values
-from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.via_point_ga.string_operators import NewTrajectories, StringCrossover
 from evoexp.planners.via_point_ga.strings import Problem, Search, Strings, settle, smooth
 from evoexp.records import Block, FloatArray

@@ -13,19 +13,17 @@ from evoexp.collision.bodies.body_tables import FlatTables
 from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
-from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.operators.operator import Breeding, Cross, Genome, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, copy_members, summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
+from evoexp.objectives.motion_criteria import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.redistribution import measure_paths, redistribute_arms, relax_points
-from evoexp.planners.answers import JudgementArrays
+from evoexp.planners.answers import JudgementArrays, Proofs
 from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.driver import GeneticSearch, generations_per_call
 from evoexp.planners.planner import Candidate
-from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.string_operators import num_uniforms, walk_strings
 from evoexp.records import Best, FloatArray, IntArray
 

@@ -24,7 +24,7 @@ from evoexp.condition import Condition
 from evoexp.numeric.cache_folder import cache_root, read_kept, write_kept
 from evoexp.numeric.kernel_folders import sources_key
 from evoexp.paths.motion import Motion
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.answers import judge_motion
 from evoexp.records import FloatArray
 from evoexp.registry import COMPONENTS, registrations
 from evoexp.report.results.run_measures import grouped

@@ -1,4 +1,4 @@
-"""Multi-start improvement: the planner's own local operator from many starts, without evolution."""
+"""Controls that draw individuals as a planner does, without evolution: at random, multi-start."""
 
 import itertools
 from typing import Any, ClassVar
@@ -8,6 +8,17 @@ import numpy as np
 from evoexp.errors import SettingError
 from evoexp.planners.planner import Populations, WrappedPlanner
 from evoexp.validation import Count
+
+
+class RandomSearch(WrappedPlanner):
+    """Draws individuals as the wrapped planner draws its first ones, as many as it evaluates."""
+
+    component: ClassVar[str] = "random_search"
+
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
+        """Yield one generation of new samples after the other."""
+        for index in itertools.count():
+            yield self.planner.sample(problem, rng, self.planner.num_evaluations(index))
 
 
 class MultiStart(WrappedPlanner):

@@ -80,7 +80,6 @@ def run_replicate(
 
 
 def _judged(planner: Any, problem: Any, last: Block) -> dict[str, Any]:
-    """Judge the best motion on exact geometry; return the fields of a summary that tell of it."""
     begun_s, best = time.process_time(), last.bests[-1]
     verdict = judge_motion(planner, problem, planner.motion(problem, best.solution))
     certificate_s = time.process_time() - begun_s

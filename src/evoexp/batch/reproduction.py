@@ -94,7 +94,6 @@ class Comparison(NamedTuple):
 
     @property
     def _decisive(self) -> FieldDifference | None:
-        """The first difference that is none of rounding."""
         large = (each for each in self.fields if not (self.inexact and each.is_close))
         return next(large, None)
 

@@ -152,13 +152,7 @@ def play(arguments: argparse.Namespace) -> int:
 def export(arguments: argparse.Namespace) -> int:
     """Write a motion as a joint trajectory, for a robot or MoveIt."""
     from evoexp.commands.console import say
-    from evoexp.playback.trajectory import (  # and scipy
-        as_csv,
-        as_json,
-        as_ros,
-        joint_limits,
-        trajectory,
-    )
+    from evoexp.playback import trajectory  # and scipy
 
     if not 0.0 < arguments.ramp < math.inf:
         raise SettingError("--ramp", "greater than 0", arguments.ramp)
@@ -166,12 +160,18 @@ def export(arguments: argparse.Namespace) -> int:
     prismatic = np.array([joint.prismatic for joint in found.joints])
     speeds = speed_limits(arguments).of(prismatic, found.size)
     names = tuple(joint.name for joint in found.joints)
-    limits = joint_limits(names, arguments.limits, speeds, found.velocity_limits, arguments.ramp)
-    timed = trajectory(found, arguments.timing, limits)
+    limits = trajectory.joint_limits(
+        names, arguments.limits, speeds, found.velocity_limits, arguments.ramp
+    )
+    timed = trajectory.trajectory(found, arguments.timing, limits)
     if arguments.format == "ros":
-        content = as_ros(timed)
+        content = trajectory.as_ros(timed)
     else:
-        content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
+        content = (
+            trajectory.as_csv(timed)
+            if arguments.format == "csv"
+            else trajectory.as_json(found, timed)
+        )
     ending = ".csv" if arguments.format == "csv" else ".json"
     write(output_path(arguments, [found], ending), content)
     # how long the motion takes, how near it comes to the limits, and what is proven of it

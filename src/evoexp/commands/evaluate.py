@@ -10,16 +10,11 @@ from typing import Any
 from rich.table import Column, Table
 
 from evoexp.collision.certifier.certificate import PAIR
+from evoexp.commands import motion_files
 from evoexp.commands.chosen_motions import named_log, write
 from evoexp.commands.command_parser import is_motion
 from evoexp.commands.console import new_table, plain_console, print_json, right, say
-from evoexp.commands.motion_files import (
-    FittingMotion,
-    fitting_motions,
-    initial_motion,
-    nested,
-    stored_motion,
-)
+from evoexp.commands.motion_files import FittingMotion, fitting_motions, nested, stored_motion
 from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion
@@ -96,7 +91,7 @@ def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
         raise MotionFileError("--replicate: must go with a hash, was given with an experiment")
     asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
     if arguments.write is not None and not any(is_motion(word) for word in words):
-        return [initial_motion(words, **asked)]
+        return [motion_files.initial_motion(words, **asked)]
     return fitting_motions(words, **asked)[1]
 
 

@@ -116,7 +116,6 @@ def _seconds(mean: float | None, least: float | None, most: float | None) -> str
 
 
 def _total(rows: Sequence[PlannedCondition], workers: int) -> str:
-    """Say how many replicates would run, and how long it would take."""
     missing, failed = sum(row.missing for row in rows), sum(row.failed for row in rows)
     again = f"{failed} failed before, which start with --retry-failed" if failed else ""
     if not missing:

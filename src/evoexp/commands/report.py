@@ -69,7 +69,6 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
 
 
 def _check(reports: Iterable[build.ReportFiles]) -> int:
-    """Compare reports with what is on disk, and name every file that is not the same."""
     num_reports = num_files = num_wrong = 0
     for report in reports:
         wrong = []

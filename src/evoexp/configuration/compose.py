@@ -25,32 +25,18 @@ from omegaconf.errors import OmegaConfBaseException
 
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.configuration import overrides as syntax
 from evoexp.configuration.building import build_settings, fill_in, planned_replicates
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
-from evoexp.configuration.overrides import (
-    ADD,
-    DELETE,
-    FORCE,
-    NOT_IDENTITY,
-    SCALARS,
-    Choice,
-    Override,
-    Value,
-    assigned,
-    collect,
-    expand_entry,
-    refuse_sweeps,
-    single_values,
-    sweep,
-)
+from evoexp.configuration.overrides import ADD, DELETE, NOT_IDENTITY, SCALARS, Choice, Override
 from evoexp.configuration.refusals import check_file, uncomposed, unparsed, without_header
 from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, is_file
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
-_PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
+_PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: syntax.FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 # parts of an entry of `conditions`, with what each is where it is left out
 PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
@@ -69,10 +55,10 @@ def expand(
         multirun: Whether values with commas are swept over.
         only: Labels to keep; empty keeps all.
     """
-    given = collect(map(parse, overrides))
-    refuse_sweeps(given, multirun=multirun)
+    given = syntax.collect(map(parse, overrides))
+    syntax.refuse_sweeps(given, multirun=multirun)
     asked = given.pop(EXPERIMENT, None)
-    names = [each.option() for each in single_values(asked)] if asked else [None]
+    names = [each.option() for each in syntax.single_values(asked)] if asked else [None]
     files = [None if name is None else find(EXPERIMENT, name) for name in names]
     if len({file and file.name for file in files}) < len(files):
         raise SettingError(EXPERIMENT, "names that differ", ",".join(map(str, names)))
@@ -83,7 +69,7 @@ def parse(text: str) -> Override:
     """Read one override."""
     key, equals, typed = text.partition("=")
     if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
-        return Override("", key, (Value(typed, typed),), False, text)
+        return Override("", key, (syntax.Value(typed, typed),), False, text)
     parser = OverridesParser.create()
     try:
         indexed = re.sub(r"\[(\d+)\]", r".\1", key)  # `a[0]` is `a.0`
@@ -100,7 +86,7 @@ def parse(text: str) -> Override:
     except (HydraException, ValueError, RecursionError):
         raise unparsed(text) from None
     is_bare = found.value_type is None  # a deletion
-    values = () if is_bare else tuple(map(Value, texts, map(_with_text_keys, data)))
+    values = () if is_bare else tuple(map(syntax.Value, texts, map(_with_text_keys, data)))
     return Override(_PREFIXES.get(found.type, ""), key, values, found.is_sweep_override(), text)
 
 
@@ -201,10 +187,9 @@ def _expand_one(file: Option | None, overrides: Choice, only: Sequence[str]) -> 
 
 
 def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Builder]:
-    """Return the settings that all conditions share, and the builder of the conditions."""
-    first = {key: each for key, each in next(sweep(overrides)).items() if key != FOLDER}
+    first = {key: each for key, each in next(syntax.sweep(overrides)).items() if key != FOLDER}
     shared_choice = concerning(first, compose.chosen(first).config)
-    config = assigned(compose.chosen(shared_choice).config, shared_choice)
+    config = syntax.assigned(compose.chosen(shared_choice).config, shared_choice)
     # settings outside the conditions may be taken from those of a condition
     shared = {name: config[name] for name in NOT_IDENTITY if name in config}
     base = fill_in(shared, config)
@@ -231,7 +216,7 @@ def _entries(conditions: Any) -> Iterator[Entry]:
         raise SettingError("conditions", "a mapping of labels to lists of overrides", conditions)
     for label, entry in (conditions or {"": []}).items():
         for template, overrides in readings(str(label), entry):
-            yield from expand_entry(template, map(parse, overrides))
+            yield from syntax.expand_entry(template, map(parse, overrides))
 
 
 def readings(label: str, entry: Any) -> Iterator[tuple[str, list[str]]]:

@@ -70,7 +70,6 @@ def without_header(file: str) -> SettingError:
 
 
 def _miswritten(file: Option) -> EvoexpError | None:
-    """Return the refusal of an experiment file; None if nothing in itself is wrong with it."""
     content = Path(file.path).read_bytes()
     if HEADER.encode() not in content.splitlines()[:1]:
         return without_header(file.origin)

@@ -68,7 +68,6 @@ def folders() -> list[Folder]:
 
 
 def _declared(registration: Registration) -> Path:
-    """Return the folder that a package declares, without importing the package."""
     package, _, inner = registration.target.partition(":")
     with contextlib.suppress(ImportError, ValueError):
         spec = importlib.util.find_spec(package)

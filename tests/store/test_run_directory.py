@@ -26,11 +26,10 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash
 from evoexp.shipped import shipped
-from evoexp.store import manifest as module
+from evoexp.store import identity as module
 from evoexp.store.files import NUM_THREADS
-from evoexp.store.identity import origin, run_context
+from evoexp.store.identity import git_state, manifest, origin, run_context
 from evoexp.store.log import Finished
-from evoexp.store.manifest import git_state, manifest
 from evoexp.store.run_directory import RunDirectory, lock_all, resolve
 from evoexp.store.summaries import summary_table
 from store_lookup import find_runs

@@ -12,8 +12,8 @@ from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import Block, ReplicateSummary, blocks
 from evoexp.registry import guests
+from evoexp.store.identity import environment
 from evoexp.store.log import Finished, Log
-from evoexp.store.manifest import environment
 
 GENERATIONS = "generations"  # why a run ended that used all of them up
 BUDGET_SPENT = "collision queries"  # why a run ended whose next generation exceeds the budget

@@ -18,8 +18,8 @@ from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests
 from evoexp.store import identity
+from evoexp.store.identity import manifest
 from evoexp.store.integrity import lost_replicates, mend
-from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.summaries import damaged_logs, whole_logs, write_summary
 

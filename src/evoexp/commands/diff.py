@@ -11,8 +11,7 @@ from evoexp.commands import stored_runs
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.errors import UnknownHash, printable
 from evoexp.records import TIMES
-from evoexp.store.identity import TAKEN, typed_parts
-from evoexp.store.manifest import changed, differences
+from evoexp.store.identity import TAKEN, changed, differences, typed_parts
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 

@@ -20,8 +20,7 @@ from evoexp.commands.console import hash_column, new_table, print_json, right, s
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import StoreError
-from evoexp.store.identity import CONFIG, read
-from evoexp.store.manifest import leaves
+from evoexp.store.identity import CONFIG, leaves, read
 from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
 from evoexp.store.summaries import damaged_logs, summary_table
 from evoexp.validation import TARGET

@@ -31,7 +31,7 @@ from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
 from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.pages import page_registration
-from evoexp.store.manifest import environment
+from evoexp.store.identity import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 USAGE = """evoexp: experiment: must be chosen, as in

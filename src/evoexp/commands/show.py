@@ -30,9 +30,8 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, components_in, lacking, registered
-from evoexp.store.identity import ORIGIN, TAKEN, typed_parts
+from evoexp.store.identity import ORIGIN, TAKEN, differences, environment, leaves, typed_parts
 from evoexp.store.log_reader import LogContents, read_log
-from evoexp.store.manifest import differences, environment, leaves
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET

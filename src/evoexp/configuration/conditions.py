@@ -21,7 +21,7 @@ from evoexp.configuration import overrides as syntax
 from evoexp.configuration.building import MARK, condition_of
 from evoexp.configuration.experiment import Budget, Built
 from evoexp.configuration.overrides import DELETE, Choice, Override, known_instead, single_values
-from evoexp.configuration.refusals import chosen
+from evoexp.configuration.search_path import chosen
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.shipped import Option
 

@@ -95,6 +95,13 @@ def options(group: str) -> list[str]:
     )
 
 
+def chosen(group: str) -> str:
+    """Return the requirement that an option of a group is chosen, with the options."""
+    if group == EXPERIMENT:
+        return f"chosen: experiment=NAME, one of {len(options(group))}: evoexp list"
+    return f"chosen: {', '.join(options(group))}"
+
+
 def find(group: str, name: str) -> Option:
     """Return an option: its file and where it comes from."""
     if group == EXPERIMENT and is_file(name):

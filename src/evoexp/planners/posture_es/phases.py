@@ -21,8 +21,7 @@ from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import IDENTITY, compose, frame_pose, invert, pose_of
-from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, obstacle_hulls
-from evoexp.scenarios.posture_task import (
+from evoexp.scenarios.motion_tasks import (
     Phase,
     PlaceGoal,
     PoseGoal,
@@ -30,6 +29,7 @@ from evoexp.scenarios.posture_task import (
     ShiftGoal,
     SurfaceGoal,
 )
+from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, obstacle_hulls
 
 TOOL_UP, OBJECT_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 KEPT = 64  # stages and scenes that a problem keeps

@@ -31,7 +31,7 @@ from evoexp.configuration.building import build_settings, fill_in, planned_repli
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
 from evoexp.configuration.overrides import ADD, DELETE, NOT_IDENTITY, SCALARS, Choice, Override
-from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, options
+from evoexp.configuration.search_path import EXPERIMENT, chosen, find, groups, is_file, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.input_files import MEGABYTE, read_bounded
 from evoexp.report.report_settings import ReportSettings
@@ -74,9 +74,7 @@ def expand(
 def parse(text: str) -> Override:
     """Read one override."""
     key, equals, typed = text.partition("=")
-    if (
-        key == EXPERIMENT and search_path.is_file(typed) and os.path.isfile(typed)
-    ):  # whatever its name
+    if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
         return Override("", key, (syntax.Value(typed, typed),), False, text)
     parser = OverridesParser.create()
     try:
@@ -119,11 +117,11 @@ class Composer:
         self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options
         shutil.copy(shipped.config_directory() / "config.yaml", root)
         (root / EXPERIMENT).mkdir()
-        for folder in folders():
+        for folder in search_path.folders():
             if folder.origin != shipped.ORIGIN:
                 for path in sorted(folder.path.glob("*/*.yaml")):
                     check_file(path)
-        self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
+        self._path = ",".join(_quoted(f"file://{folder.path}") for folder in search_path.folders())
 
     def chosen(self, overrides: Choice) -> Composed:
         """Return the options that overrides choose, with the settings that these have."""
@@ -135,12 +133,12 @@ class Composer:
             option = names[group]
             if option is None and override.prefix == DELETE and override.values:
                 option = str(override.values[0].data)  # only that option is to be deleted
-            search_path.chosen = "" if option is None else f"={_quoted(option)}"
-            words.append(f"{'~' if names[group] is None else ''}{group}{search_path.chosen}")
+            chosen = "" if option is None else f"={_quoted(option)}"
+            words.append(f"{'~' if names[group] is None else ''}{group}{chosen}")
         if file is not None:
-            names[EXPERIMENT] = file.origin if search_path.is_file(file.origin) else file.name
+            names[EXPERIMENT] = file.origin if is_file(file.origin) else file.name
         if (key := frozenset(words)) not in self._known:
-            if file is not None and search_path.is_file(file.origin):
+            if file is not None and is_file(file.origin):
                 check_file(Path(file.path))
                 shutil.copy(file.path, self.root / EXPERIMENT / f"{file.name}.yaml")
             try:
@@ -277,9 +275,9 @@ def uncomposed(
     if missing := re.search(r"You must specify '([^']+)'", text):
         group = missing[1]
         if not choices.get(EXPERIMENT):
-            must = f"{search_path.chosen(EXPERIMENT)} (without one, every group is needed; the next is {group})"
+            must = f"{chosen(EXPERIMENT)} (without one, every group is needed; the next is {group})"
             return SettingError(EXPERIMENT, must, None)
-        return SettingError(group, search_path.chosen(group), None)
+        return SettingError(group, chosen(group), None)
     if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):
         return UnknownOption(absent[1], absent[2], options(absent[1]))
     if deleted := re.search(r"Could not delete '(([^=']+).*)'\.", text):

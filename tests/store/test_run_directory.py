@@ -264,7 +264,7 @@ def test_manifest_names_versions_and_processor_and_no_paths() -> None:
 
 
 def test_git_state_of_a_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    path = tmp_path / "src" / "evoexp" / "store" / "manifest.py"
+    path = tmp_path / "src" / "evoexp" / "store" / "identity.py"
     monkeypatch.setattr(module, "__file__", str(path))
     assert git_state.__wrapped__() is None, "an installed package has none"
     path.parent.mkdir(parents=True)

@@ -23,7 +23,7 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.judging import Hearing, Judge, Rule
-from evoexp.store.manifest import manifest
+from evoexp.store.identity import manifest
 from evoexp.store.run_directory import RunDirectory
 
 SMALL = ("budget=smoke", "ga.population_size=12", "ga.num_generations=4", "num_replicates=2")

@@ -10,15 +10,9 @@ from typing import Any
 
 import pytest
 
-from evoexp import registry
+from evoexp import errors, registry
 from evoexp.condition import Condition, revisions
-from evoexp.errors import (
-    EvoexpError,
-    RegistrationError,
-    RevisionMismatch,
-    SettingError,
-    UnknownSetting,
-)
+from evoexp.errors import EvoexpError, RegistrationError, RevisionMismatch, UnknownSetting
 from evoexp.registry import component_class
 from evoexp.version import __version__
 from guests import on_path, write_distribution
@@ -120,7 +114,7 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
                 continue
             try:
                 changed = Condition.from_config(with_value(config, path, step))
-            except SettingError:
+            except errors.SettingError:
                 continue
             assert changed.id not in others, path
             others.add(changed.id)

@@ -177,7 +177,6 @@ def _places(name: str, file: Path, packages: Mapping[str, Path], field: str) -> 
 
 
 def _workspace_folders(folder: Path, package: str) -> Iterator[Path]:
-    """Yield the folders, in and below one, whose manifest gives them the name of a package."""
     for place, folders, files in os.walk(folder):
         here, name = Path(place), None
         with contextlib.suppress(OSError):

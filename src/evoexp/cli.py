@@ -10,19 +10,9 @@ import os
 import sys
 from collections.abc import Sequence
 
+from evoexp.commands import command_process
 from evoexp.commands.command_parser import COMMANDS, command_function, command_parser, whole_parser
-from evoexp.commands.command_process import (
-    OUTPUT,
-    Interrupted,
-    Interruption,
-    complain,
-    damage_in_lines,
-    memory_shortage,
-    open_streams,
-    refuse_too_little_memory,
-    settle_streams,
-    use_temporary_folder,
-)
+from evoexp.commands.command_process import OUTPUT, Interrupted, Interruption, complain
 from evoexp.errors import EvoexpError
 
 KEPT = "finished replicates are kept, the same command runs the others"
@@ -44,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
             os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
             os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looked for everywhere
-            open_streams()
+            command_process.open_streams()
             interruption.hear()
         code = _run(words, is_process)
         sys.stdout.flush()  # here, where an error is explained
@@ -55,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         interruption.end()
         if is_process:
-            settle_streams()
+            command_process.settle_streams()
 
 
 def _run(words: Sequence[str], is_process: bool) -> int:
@@ -65,21 +55,20 @@ def _run(words: Sequence[str], is_process: bool) -> int:
         parser.print_help()
         return 0
     chosen = words[0]
-    refuse_too_little_memory()
+    command_process.refuse_too_little_memory()
     if is_process:
-        use_temporary_folder()
+        command_process.use_temporary_folder()
     given = command_parser(chosen).parse_intermixed_args(words[1:])
     with contextlib.ExitStack() as stack:
         if folders := getattr(given, "config_dir", ()):
             from evoexp.configuration.search_path import searched_first
 
             stack.enter_context(searched_first(folders))
-        stack.enter_context(damage_in_lines())
+        stack.enter_context(command_process.damage_in_lines())
         return int(command_function(chosen)(given))
 
 
 def _explain(error: BaseException, words: Sequence[str], interruption: Interruption) -> int:
-    """Say in one line why a command ended; return its exit code."""
     if isinstance(error, SystemExit):
         raise error
     kept = f"; {KEPT}" if words[:1] == ["run"] else ""
@@ -89,7 +78,7 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
     if isinstance(error, EvoexpError):
         complain(str(error))
         return 2
-    if text := memory_shortage(error):
+    if text := command_process.memory_shortage(error):
         complain(text)
         return 2
     if not isinstance(error, OSError) or error.errno is None:

@@ -112,7 +112,6 @@ def load(
 
 
 def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str, pd.Series]:
-    """Return the columns that tell the conditions apart, and their seeds."""
     contexts = {
         run.condition_id: run_context(run.path, run.condition_id, summaries.columns) for run in runs
     }

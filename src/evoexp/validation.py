@@ -193,7 +193,6 @@ def _members(value: Any) -> Mapping[str, Any]:
 
 
 def _inner(kinds: set[type[Settings]], part: int | str) -> set[type[Settings]]:
-    """Return the classes of settings one step down a location, as pydantic gives it."""
     inner = {
         own
         for each in kinds

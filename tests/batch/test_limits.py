@@ -20,12 +20,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.batch.reproduction import reproduce_log
 from evoexp.batch.runner import Batch
-from evoexp.batch.runner_settings import (
-    RunnerSettings,
-    allowed_memory,
-    machine_memory,
-    refuse_large,
-)
+from evoexp.batch.runner_settings import RunnerSettings, allowed_memory, machine_memory
 from evoexp.cli import KEPT, main
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
@@ -94,7 +89,7 @@ def test_a_container_has_less_memory_than_its_machine(
 def test_more_generations_than_a_log_holds_are_refused() -> None:
     must = "planner: must be of fewer than 512,000 generations: a log holds 128 MB"
     with pytest.raises(SettingError, match=must):
-        refuse_large(changed("num_generations", 10**9), 1e15)
+        runner_settings.refuse_large(changed("num_generations", 10**9), 1e15)
 
 
 def test_a_log_from_elsewhere_is_not_run_again_beyond_the_memory(

@@ -13,15 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evoexp.batch.jobs as jobs_module
-from evoexp.batch.jobs import (
-    MAX_BUNDLE,
-    NO_LIMITS,
-    Job,
-    Outcome,
-    Replicates,
-    read_curves,
-    warm_kernels,
-)
+from evoexp.batch import jobs as job_module
+from evoexp.batch.jobs import MAX_BUNDLE, NO_LIMITS, Job, Outcome, Replicates, read_curves
 from evoexp.batch.replicate import BUDGET_SPENT, run_replicate
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.cli import main
@@ -243,7 +236,7 @@ def test_what_fails_or_takes_too_long_is_left_to_the_replicates(
     fail(fault)
     monkeypatch.setattr(jobs_module, "COMPILING_S", 1.0)
     begun = time.monotonic()
-    warm_kernels([job(faulty)], ReplicateLimits(timeout_s=0.1))
+    job_module.warm_kernels([job(faulty)], ReplicateLimits(timeout_s=0.1))
     assert time.monotonic() - begun < 60.0
 
 

@@ -14,21 +14,11 @@ from typing import Any
 import pytest
 from process_table import PATIENCE_S, are_gone, processes
 
+import worker_tasks
 from evoexp.batch import workers as workers_module
 from evoexp.batch.workers import DIED_TWICE, Died, WorkerError, Workers, in_order
 from matrix import counts
-from worker_tasks import (
-    LEAST,
-    MEGABYTE,
-    MOST,
-    Struck,
-    content,
-    end,
-    end_once,
-    fork_and_die,
-    refuse,
-    work,
-)
+from worker_tasks import LEAST, MEGABYTE, MOST, Struck, content, end, end_once, refuse, work
 
 
 def test_results_come_in_order_and_each_task_is_done_once() -> None:
@@ -109,7 +99,7 @@ def test_workers_that_never_begin_are_not_started_for_ever(monkeypatch: pytest.M
 def test_a_dead_worker_is_noticed_whoever_inherited_its_socket() -> None:
     begun = time.monotonic()
     with Workers(1) as workers, pytest.raises(WorkerError, match=DIED_TWICE):
-        list(in_order(workers, fork_and_die, [(10 * PATIENCE_S,)]))
+        list(in_order(workers, worker_tasks.fork_and_die, [(10 * PATIENCE_S,)]))
     assert time.monotonic() - begun < 10 * PATIENCE_S
 
 

@@ -13,14 +13,8 @@ from pathlib import Path
 import pytest
 
 from evoexp.cli import main
-from evoexp.commands.command_process import (
-    LEAST_MB,
-    LOCK,
-    MEGABYTE,
-    PREFIX,
-    memory_shortage,
-    remove_abandoned,
-)
+from evoexp.commands import command_process
+from evoexp.commands.command_process import LOCK, PREFIX, memory_shortage, remove_abandoned
 from evoexp.errors import SettingError
 from matrix import counts
 
@@ -118,14 +112,14 @@ def test_temporary_files_may_be_anywhere(place: str, tmp_path: Path) -> None:
 RUN = ("run", "experiment=rana_planar", "budget=smoke", "--no-report", "num_replicates=2")
 SERIAL, WORKERS = (*RUN, "runner=serial"), (*RUN, "runner.num_workers=2")
 IS_EXHAUSTIVE = counts(0, 1) == 1
-MEGABYTES = range(100, 4_000, 300) if IS_EXHAUSTIVE else (40, LEAST_MB - 1)
+MEGABYTES = range(100, 4_000, 300) if IS_EXHAUSTIVE else (40, command_process.LEAST_MB - 1)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of addresses are kept here")
 
 
 def run_within(megabytes: int, outputs: Path, *words: str) -> tuple[int, str]:
     """Run a command with few addresses; return its exit code and what it complains of."""
-    limit = megabytes * MEGABYTE
+    limit = megabytes * command_process.MEGABYTE
     done = subprocess.run(
         [sys.executable, "-m", "evoexp", *words],
         env={"EVOEXP_OUTPUTS": str(outputs), "PATH": "", "HOME": str(outputs)},
@@ -141,7 +135,7 @@ def run_within(megabytes: int, outputs: Path, *words: str) -> tuple[int, str]:
 @pytest.mark.parametrize("megabytes", MEGABYTES)
 def test_it_is_one_line(words: tuple[str, ...], megabytes: int, tmp_path: Path) -> None:
     code, complaint = run_within(megabytes, tmp_path / "outputs", *words)
-    assert code == (2 if megabytes < LEAST_MB else 0), complaint
+    assert code == (2 if megabytes < command_process.LEAST_MB else 0), complaint
     if code == 0:
         assert complaint == ""
     else:
@@ -152,7 +146,7 @@ def test_it_is_one_line(words: tuple[str, ...], megabytes: int, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("megabytes", "words"),
     [  # kernels compile for minutes in a new home
-        (LEAST_MB, SERIAL if IS_EXHAUSTIVE else ("list",)),
+        (command_process.LEAST_MB, SERIAL if IS_EXHAUSTIVE else ("list",)),
         (40, ("--help",)),
     ],
 )

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from evoexp.shipped import shipped
 from evoexp.store.archive import pack
+from evoexp.store.identity import changed
 from evoexp.store.log import SUMMARY
-from evoexp.store.manifest import changed
 from evoexp.store.run_directory import RunDirectory
 from forged_logs import with_metadata
 from store_lookup import find_runs

@@ -7,7 +7,7 @@ import pytest
 from command_samples import SMALL, Evoexp, content
 
 from evoexp.commands import report
-from evoexp.commands.claim_list import KEYS
+from evoexp.commands.report import KEYS
 from evoexp.configuration.search_path import options
 from evoexp.registry import CLAIMS, Registration, registrations
 from evoexp.report.statistics.judging import registered_rules

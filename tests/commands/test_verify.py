@@ -13,7 +13,7 @@ import pytest
 from command_samples import SERIAL, Evoexp, content
 
 import evoexp as package
-from evoexp.commands import verify
+from evoexp.commands import store_care
 from evoexp.errors import DamagedStore
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.store import identity
@@ -185,7 +185,7 @@ def test_a_run_that_nothing_knows(evoexp: Evoexp, run: RunDirectory) -> None:
 def test_large_stores_are_checked_by_workers(
     evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verify, "LARGE", 1)
+    monkeypatch.setattr(store_care, "LARGE", 1)
     flip(run.log_path(1))
     said = evoexp("verify", "--json")
     assert said.code == 1

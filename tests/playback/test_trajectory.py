@@ -12,20 +12,8 @@ import yaml
 
 from evoexp.input_files import TableError
 from evoexp.paths.motion import Motion, clamped_cubic
+from evoexp.playback import trajectory as timing
 from evoexp.playback.recording import Joint, Recording
-from evoexp.playback.trajectory import (
-    BadTiming,
-    JointLimits,
-    LimitsFileError,
-    SpeedLimits,
-    Trajectory,
-    as_csv,
-    as_json,
-    as_ros,
-    fastest,
-    joint_limits,
-    trajectory,
-)
 from evoexp.playback.trajectory_files import fitted, parse_message, read_columns, read_message
 from playback_samples import SAMPLES, recording
 
@@ -33,15 +21,15 @@ PATH = np.array([[0.0, 0.0], [1.0, -0.5], [1.0, -0.5], [1.01, -0.5], [0.0, 2.0]]
 HALF, ONE = np.full(2, 0.5), np.full(2, 1.0)
 
 
-def limits_of(shown: Recording) -> JointLimits:
+def limits_of(shown: Recording) -> timing.JointLimits:
     """Return the limits that the command takes where nothing else is said."""
     prismatic = np.array([joint.prismatic for joint in shown.joints])
-    speeds = SpeedLimits().of(prismatic, shown.size)
-    return JointLimits(speeds, speeds / 0.5)
+    speeds = timing.SpeedLimits().of(prismatic, shown.size)
+    return timing.JointLimits(speeds, speeds / 0.5)
 
 
-def uniform(name: str) -> Trajectory:
-    return trajectory(recording(name), "uniform", limits_of(recording(name)))
+def uniform(name: str) -> timing.Trajectory:
+    return timing.trajectory(recording(name), "uniform", limits_of(recording(name)))
 
 
 def cubics(times: np.ndarray, positions: np.ndarray, velocities: np.ndarray) -> Any:
@@ -70,8 +58,8 @@ def test_a_controller_executes_the_very_motion_that_was_judged(name: str) -> Non
 
 def test_both_formats_say_the_same() -> None:
     shown, found = recording("co-evolution"), uniform("co-evolution")
-    data = json.loads(as_json(shown, found))
-    head, *rows = csv.reader(io.StringIO(as_csv(found).decode()))
+    data = json.loads(timing.as_json(shown, found))
+    head, *rows = csv.reader(io.StringIO(timing.as_csv(found).decode()))
     assert data["joint_names"] == [joint.name for joint in shown.joints]
     assert data["interpolation"] == "cubic"
     assert head[:2] == ["time_s", f"{shown.joints[0].name}_rad"]
@@ -81,7 +69,7 @@ def test_both_formats_say_the_same() -> None:
 
 
 def test_lines_keep_the_limits_stay_on_the_lines_and_could_hardly_be_faster(toppra: None) -> None:
-    times, positions, velocities = fastest(Motion(PATH), HALF, ONE)
+    times, positions, velocities = timing.fastest(Motion(PATH), HALF, ONE)
     assert (np.diff(times) > 0.0).all()
     curve, at = cubics(times, positions, velocities), np.linspace(0.0, times[-1], 20001)
     assert np.abs(curve(at, 1)).max() <= 0.5 * (1.0 + 1e-9)
@@ -99,14 +87,14 @@ def test_lines_keep_the_limits_stay_on_the_lines_and_could_hardly_be_faster(topp
 
 
 def test_a_motion_that_stands_still_takes_a_second(toppra: None) -> None:
-    times, positions, velocities = fastest(Motion(np.ones((3, 2))), ONE, ONE)
+    times, positions, velocities = timing.fastest(Motion(np.ones((3, 2))), ONE, ONE)
     assert (times.tolist(), positions.tolist()) == ([0.0, 1.0], [[1.0, 1.0]] * 2)
     assert not velocities.any()
 
 
 def test_a_curve_is_followed_without_a_stop(toppra: None) -> None:
     motion = clamped_cubic(PATH[[0, 1, 4]])
-    _, positions, velocities = fastest(motion, HALF, ONE)
+    _, positions, velocities = timing.fastest(motion, HALF, ONE)
     assert not velocities[[0, -1]].any() and velocities[5:-5].any(axis=1).all()
     truth = np.array([motion.at(t) for t in np.linspace(0.0, 2.0, 4001)])
     assert max(np.linalg.norm(truth - point, axis=1).min() for point in positions) < 1e-3
@@ -117,7 +105,7 @@ def test_a_curve_is_followed_without_a_stop(toppra: None) -> None:
 def test_every_limit_is_kept_from_rest_to_rest(name: str, toppra: None) -> None:
     shown = recording(name)
     limits = limits_of(shown)
-    found = trajectory(shown, "optimal", limits)
+    found = timing.trajectory(shown, "optimal", limits)
     steps = np.diff(found.times)
     assert (steps > 0.0).all()
     assert not found.velocities[[0, -1]].any()
@@ -136,15 +124,15 @@ def test_every_limit_is_kept_from_rest_to_rest(name: str, toppra: None) -> None:
 def test_without_toppra_one_line_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "toppra", None)
     line = r"^--timing optimal needs toppra: pip install 'evoexp\[timing\]'; --timing uniform does"
-    with pytest.raises(BadTiming, match=line):
-        fastest(Motion(PATH), ONE, ONE)
+    with pytest.raises(timing.BadTiming, match=line):
+        timing.fastest(Motion(PATH), ONE, ONE)
 
 
 def test_ros_reads_the_message() -> None:
     rosbags = pytest.importorskip("rosbags.typesys", reason="needs rosbags")
     store = rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY)
     found, types = uniform("two arms"), store.types
-    data = json.loads(as_ros(found))
+    data = json.loads(timing.as_ros(found))
     stamp = types["builtin_interfaces/msg/Time"](**data["header"].pop("stamp"))
     header = types["std_msgs/msg/Header"](stamp=stamp, **data.pop("header"))
     duration = types["builtin_interfaces/msg/Duration"]
@@ -169,8 +157,8 @@ def test_sliding_joints_have_the_unit_of_the_scene_and_ros_has_the_metre_alone()
     found = uniform("grid")
     assert found.units == ("unit", "unit")
     line = r"^--format ros: joints that slide must do so in m, was unit$"
-    with pytest.raises(BadTiming, match=line):
-        as_ros(found)
+    with pytest.raises(timing.BadTiming, match=line):
+        timing.as_ros(found)
 
 
 NAMES = ("shoulder", "elbow")
@@ -193,10 +181,10 @@ def test_the_file_comes_before_the_robot_and_this_one_before_the_command_line(
 ) -> None:
     path = tmp_path / "joint_limits.yaml"
     path.write_text(FILE)
-    found = joint_limits(NAMES, path, *DEFAULTS)
+    found = timing.joint_limits(NAMES, path, *DEFAULTS)
     assert found.velocity.tolist() == [0.7, 3.0]
     assert found.acceleration.tolist() == [1.4, 4.0]
-    assert joint_limits(NAMES, None, *DEFAULTS).velocity.tolist() == [1.0, 3.0]
+    assert timing.joint_limits(NAMES, None, *DEFAULTS).velocity.tolist() == [1.0, 3.0]
 
 
 REFUSED: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("refused_files.yaml").read_text())
@@ -207,8 +195,8 @@ def test_bad_files_are_refused_in_one_line(text: str | None, line: str, tmp_path
     path = tmp_path / "joint_limits.yaml"
     if text is not None:
         path.write_text(text)
-    with pytest.raises(LimitsFileError) as refused:
-        joint_limits(NAMES, path, *DEFAULTS)
+    with pytest.raises(timing.LimitsFileError) as refused:
+        timing.joint_limits(NAMES, path, *DEFAULTS)
     assert line in str(refused.value) and "\n" not in str(refused.value)
 
 

@@ -26,8 +26,8 @@ from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.references.reference import one_thread
 from evoexp.report.results.stored_results import gather
+from evoexp.store.identity import environment
 from evoexp.store.log_reader import read_log
-from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory
 from guests import on_path, write_distribution
 from masked_logs import masked_log

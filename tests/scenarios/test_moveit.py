@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 import yaml
 
+import moveit_samples as samples
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
@@ -20,25 +21,7 @@ from evoexp.scenarios.moveit_files import FIELDS, REQUEST, SCENE
 from evoexp.scenarios.moveit_scene import read_allowed, read_frames, read_state
 from evoexp.scenarios.obstacles import BOX, obstacle_table
 from evoexp.testing import conditions
-from moveit_samples import (
-    COVERED,
-    GOAL,
-    JOINTS,
-    REFUSED_MESSAGES,
-    START,
-    body,
-    document,
-    mesh,
-    obstacles_of,
-    problem,
-    random_pose,
-    read,
-    request,
-    scene,
-    write_problem,
-    write_robot,
-    written,
-)
+from moveit_samples import REFUSED_MESSAGES, body, document, mesh, problem, read, request, scene
 
 HALF = float(np.sqrt(0.5))
 CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -66,7 +49,7 @@ def test_bodies_of_an_object_are_counted_and_small_numbers_read() -> None:
     """YAML takes 1e-05 for a text."""
     thing = body("sphere", [0.1], [0.0, 0.0, 7.0])
     thing = {key: 2 * value if isinstance(value, list) else value for key, value in thing.items()}
-    text = written(scene(thing)).replace("7.0", "1e-05")
+    text = samples.written(scene(thing)).replace("7.0", "1e-05")
     world = read(text.encode())
     assert [each.center for each in world.obstacles] == [(0.0, 0.0, 1e-5)] * 2
     assert [each.name for each in world.obstacles] == ["thing_1", "thing_2"]
@@ -75,7 +58,7 @@ def test_bodies_of_an_object_are_counted_and_small_numbers_read() -> None:
 
 def test_searches_take_the_box_around_a_hull() -> None:
     rng = np.random.default_rng(0)
-    pose, plain = random_pose(rng)
+    pose, plain = samples.random_pose(rng)
     corners, triangles = hull_of(rng.normal(size=(20, 3))) or (CUBE, CUBE)
     table = obstacle_table(read(scene(mesh(corners, triangles, mesh_poses=[plain]))).obstacles)
     assert table.kind.tolist() == [BOX]
@@ -151,8 +134,11 @@ def asked(**changes: Any) -> Any:
 def test_a_request_names_group_start_and_goal() -> None:
     found, _ = asked()
     assert found.group == "arm"
-    assert found.joint_goal == dict(zip(JOINTS, GOAL, strict=True))
-    assert found.start == dict(zip(JOINTS, START, strict=True)) | {"finger": 0.05, "nail": 0.3}
+    assert found.joint_goal == dict(zip(samples.JOINTS, samples.GOAL, strict=True))
+    assert found.start == dict(zip(samples.JOINTS, samples.START, strict=True)) | {
+        "finger": 0.05,
+        "nail": 0.3,
+    }
     assert not found.link
 
 
@@ -269,13 +255,13 @@ def test_a_slip_in_a_name_is_told_its_nearest() -> None:
 
 def test_a_matrix_speaks_of_links_not_of_names_that_are_like_theirs(tmp_path: Path) -> None:
     """`lower_1` is a link of its own, not a body of `lower`."""
-    write_robot(tmp_path)
+    samples.write_robot(tmp_path)
     text = (tmp_path / "small.urdf").read_text()
     (tmp_path / "small.urdf").write_text(text.replace('"tip"', '"lower_1"'))
     allowed = {"entry_names": ["base", "lower"], "entry_values": [[False, True], [True, False]]}
-    words = write_problem(tmp_path, scene(allowed_collision_matrix=allowed))
+    words = samples.write_problem(tmp_path, scene(allowed_collision_matrix=allowed))
     path = f"robot.path={tmp_path / 'small.urdf'}"
-    (condition,) = conditions(*words, *COVERED, "robot=urdf", path).values()
+    (condition,) = conditions(*words, *samples.COVERED, "robot=urdf", path).values()
     built = condition.robot.build()
     assert links_of_bodies(built)["lower_1"] == "lower_1"
     disabled = with_allowed_pairs(built, condition.scenario).disabled
@@ -309,7 +295,7 @@ def test_meshes_that_a_scene_names_are_found_as_a_urdf_s(
         return scene(part | {"mesh_poses": [{}], "pose": {"position": [5, 0, 0]}})
 
     def points(condition: Condition) -> Any:
-        (hull,) = obstacles_of(condition)
+        (hull,) = samples.obstacles_of(condition)
         assert np.allclose(hull.center, [5, 0, 0])
         return np.array(sorted(hull.points))
 

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import evoexp
+import moveit_samples as samples
 from coal_shapes import distance_of_point, placed
 from composed import composed
 from evoexp.collision.scene import obstacle_shapes
@@ -21,19 +22,7 @@ from evoexp.planners.arm_tasks import posture_task
 from evoexp.robots.meshes import convex_shape
 from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table
 from evoexp.testing import conditions
-from moveit_samples import (
-    COVERED,
-    REFUSED_MESSAGES,
-    body,
-    mesh,
-    obstacles_of,
-    problem,
-    random_pose,
-    request,
-    scene,
-    write_problem,
-    write_robot,
-)
+from moveit_samples import COVERED, body, mesh, obstacles_of, problem, random_pose, request, scene
 from moveit_semantics import MoveitScene, PlacedShape
 
 ASSETS = Path(evoexp.__file__).parent / "assets" / "motionbenchmaker"
@@ -140,7 +129,7 @@ def test_every_object_stands_where_moveit_puts_it(planning: str, seed: int, tmp_
     transforms.append({"header": {"frame_id": planning}, "child_frame_id": planning})
     names = ["", planning, "camera", "/camera", "shelf", "base", "/base", "plate", "/plate"]
     message = scene(*random_objects(rng, names), fixed_frame_transforms=transforms)
-    words = [*write_robot(tmp_path), *write_problem(tmp_path, message), *COVERED]
+    words = [*samples.write_robot(tmp_path), *samples.write_problem(tmp_path, message), *COVERED]
     urdf = (tmp_path / "small.urdf").read_text().replace("</robot>", MOUNT)
     (tmp_path / "small.urdf").write_text(urdf)
     at = "robot.base_position=[0.4,-0.3,0.2]", "robot.base_rotation=[20,-30,70]"
@@ -159,9 +148,9 @@ def ball(frame: str, *transforms: dict[str, Any]) -> dict[str, Any]:
     return scene(thing, fixed_frame_transforms=list(transforms))
 
 
-@pytest.mark.parametrize("case", REFUSED_MESSAGES["frames"])
+@pytest.mark.parametrize("case", samples.REFUSED_MESSAGES["frames"])
 def test_frames_that_would_be_guessed_are_refused(case: str, tmp_path: Path) -> None:
-    row = REFUSED_MESSAGES["frames"][case]
+    row = samples.REFUSED_MESSAGES["frames"][case]
     transforms = [moved(*each) for each in row["transforms"]]
     with pytest.raises(SettingError, match=row["named"]) as refusal:
         problem(tmp_path, ball(row["ball"], *transforms)).prepare()
@@ -187,12 +176,12 @@ def test_a_scene_of_one_frame_needs_no_transform_and_a_virtual_joint_names_it(
 ) -> None:
     def place(frame: str, *transforms: dict[str, Any]) -> tuple[float, ...]:
         (condition,) = conditions(
-            *words, *write_problem(tmp_path, ball(frame, *transforms))
+            *words, *samples.write_problem(tmp_path, ball(frame, *transforms))
         ).values()
         (obstacle,) = obstacles_of(condition)
         return tuple(obstacle.center)
 
-    words = [*write_robot(tmp_path), *COVERED, "robot.base_position=[0,1,0]"]
+    words = [*samples.write_robot(tmp_path), *COVERED, "robot.base_position=[0,1,0]"]
     assert place("") == place("world") == (3.0, 0.0, 0.0)
     assert place("base") == place("/base") == (3.0, 1.0, 0.0)
     srdf = tmp_path / "small.srdf"

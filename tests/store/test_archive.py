@@ -10,10 +10,10 @@ from store_samples import CONDITION, CONFIG, generations, write
 
 from confinement import confined
 from evoexp.store.archive import ArchiveError, pack, take_in
+from evoexp.store.identity import manifest
 from evoexp.store.integrity import check_run
 from evoexp.store.log import MAX_LOG
 from evoexp.store.log_reader import read_log
-from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory
 
 URDF = Path(__file__).parent / "data" / "urdf.mcap"

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from store_samples import CONDITION, CONFIG, SUMMARY, generations, write
+from store_samples import CONDITION, CONFIG, ENVIRONMENT, SUMMARY, generations, write
 
 from evoexp import attachments
+from evoexp.batch.runner import manifest_of
 from evoexp.commands.chosen_motions import chosen_log
 from evoexp.errors import DamagedStore, NothingStored, StoreError, UnknownHash
 from evoexp.records import Block
@@ -217,11 +218,16 @@ def test_a_lost_configuration_is_taken_from_a_log(
     [('{"condition": ', "damaged"), (f'{{"condition": "{"f" * 64}"}}', "is of run")],
 )
 def test_a_lost_manifest_is_named_with_the_command_that_renews_it(
-    run: RunDirectory, content: str, why: str
+    run: RunDirectory, add: Add, content: str, why: str
 ) -> None:
+    """The new one tells the environment of the logs, not that of today."""
+    add(0)
     (run.path / "manifest.json").write_text(content)
     with pytest.warns(DamagedStore, match=rf"manifest\.json: {why}.*Mend it: evoexp run"):
         assert run.manifest() == {}
+    mended(run, "and written again: manifest.json")
+    run.create(CONFIG, manifest_of(run, CONFIG))
+    assert run.manifest() == {"condition": CONDITION, **ENVIRONMENT, "git": None}
 
 
 def test_the_manifest_alone_knows_the_name(run: RunDirectory, tmp_path: Path) -> None:

@@ -10,20 +10,10 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import log_anatomy as anatomy
 import numpy as np
 import pytest
 import zstandard
-from log_anatomy import (
-    Part,
-    framed,
-    index_of,
-    message,
-    parsed,
-    put_together,
-    records,
-    take_apart,
-    written,
-)
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 from store_samples import generations, write
@@ -73,9 +63,9 @@ def attempt(content: bytes) -> list[str]:
     return refusals
 
 
-def opened() -> tuple[list[Part], Part]:
+def opened() -> tuple[list[anatomy.Part], anatomy.Part]:
     """Return the parts of the log, and its first chunk among them."""
-    parts = take_apart(CONTENT)
+    parts = anatomy.take_apart(CONTENT)
     return parts, next(part for part in parts if part.opcode == Opcode.CHUNK)
 
 
@@ -83,12 +73,12 @@ def with_rows(rows: Iterable[bytes]) -> bytes:
     """Return a log with other messages on /generation."""
     parts, chunk = opened()
     kept = {True: b"", False: b""}  # messages of other topics; schemas and channels
-    for opcode, body in records(chunk.body):
+    for opcode, body in anatomy.records(chunk.body):
         is_message = opcode == Opcode.MESSAGE
         if not is_message or struct.unpack_from("<H", body)[0] != 1:
-            kept[is_message] += framed(opcode, body)
-    chunk.body = b"".join([kept[False], *(message(1, row) for row in rows), kept[True]])
-    return put_together(parts)
+            kept[is_message] += anatomy.framed(opcode, body)
+    chunk.body = b"".join([kept[False], *(anatomy.message(1, row) for row in rows), kept[True]])
+    return anatomy.put_together(parts)
 
 
 def zeros(size: int) -> bytes:
@@ -103,7 +93,7 @@ def test_a_chunk_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     chunk.frame = zeros(size)
     for told, reason in ((size, "at most"), (1000, "size that it tells")):
         chunk.size = told
-        bomb = put_together(parts)
+        bomb = anatomy.put_together(parts)
         assert len(bomb) < 150_000
         refusals = confined(functools.partial(attempt, bomb), tmp_path, LITTLE)
         assert len(refusals) == len(READERS)
@@ -112,9 +102,9 @@ def test_a_chunk_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
 
 def test_many_chunks_that_unpack_to_gigabytes(tmp_path: Path) -> None:
     (parts, _), size = opened(), 2**22
-    part = Part(Opcode.CHUNK, b"")
-    part.frame, part.size = zstandard.compress(framed(Opcode.SCHEMA, bytes(size - 9))), size
-    bomb = put_together([*parts, *[part] * 1000])
+    part = anatomy.Part(Opcode.CHUNK, b"")
+    part.frame, part.size = zstandard.compress(anatomy.framed(Opcode.SCHEMA, bytes(size - 9))), size
+    bomb = anatomy.put_together([*parts, *[part] * 1000])
     assert len(bomb) < 500_000
     refusals = confined(lambda: attempt(bomb), tmp_path, LITTLE)
     assert any("too large: 1" in text and "up to 128 MB" in text for text in refusals)
@@ -124,11 +114,11 @@ def test_many_chunks_that_unpack_to_gigabytes(tmp_path: Path) -> None:
 def test_an_array_that_claims_what_it_has_not(name: str, tmp_path: Path) -> None:
     parts, _ = opened()
     for part in (each for each in parts if each.opcode == Opcode.ATTACHMENT):
-        attachment = parsed(Attachment, part.body)
+        attachment = anatomy.parsed(Attachment, part.body)
         if attachment.name.endswith(".npy"):
             attachment.data = OTHERS[name][0]
-            part.body = written(attachment)
-    (refusal,) = confined(lambda: attempt(put_together(parts)), tmp_path, LITTLE)
+            part.body = anatomy.written(attachment)
+    (refusal,) = confined(lambda: attempt(anatomy.put_together(parts)), tmp_path, LITTLE)
     assert "ValueError" in refusal
 
 
@@ -180,11 +170,11 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
         monkeypatch.setattr(log_reader, name, getattr(log_reader, name) // share)
     (parts, first), size = opened(), 2**22 // share
     long = b'{"generation":0,"cost":1,"values":[' + b"0," * (size // 2) + b"0]}"
-    messages = (body for opcode, body in records(first.body) if opcode == Opcode.MESSAGE)
+    messages = (body for opcode, body in anatomy.records(first.body) if opcode == Opcode.MESSAGE)
     channel = next(struct.unpack_from("<H", body)[0] for body in messages if b'"values"' in body)
-    short = b"".join(message(1, GOOD % (k, b"")) for k in range(size // 250))
-    for body in (message(channel, long), short):
-        whole = put_together([*parts, *[Part(Opcode.CHUNK, body)] * 28])
+    short = b"".join(anatomy.message(1, GOOD % (k, b"")) for k in range(size // 250))
+    for body in (anatomy.message(channel, long), short):
+        whole = anatomy.put_together([*parts, *[anatomy.Part(Opcode.CHUNK, body)] * 28])
         assert 28 * size > log_reader.MAX_LOG * 0.8
         assert confined(functools.partial(attempt, whole), tmp_path, MOST // share) == []
 
@@ -193,17 +183,17 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
 def test_more_attachments_than_any_log_has(tmp_path: Path, record: Any) -> None:
     """Each takes many times its bytes in memory."""
     opcode = Opcode.ATTACHMENT if isinstance(record, Attachment) else Opcode.METADATA
-    many = [Part(opcode, written(record))] * 3_000
-    hostile = put_together([*take_apart(CONTENT), *many], index_of(CONTENT))
+    many = [anatomy.Part(opcode, anatomy.written(record))] * 3_000
+    hostile = anatomy.put_together([*anatomy.take_apart(CONTENT), *many], anatomy.index_of(CONTENT))
     assert len(confined(lambda: attempt(hostile), tmp_path, LITTLE)) == len(READERS)
 
 
 def test_an_index_that_points_elsewhere() -> None:
     """What an attachment holds may look like a chunk, which nobody has checked."""
-    parts = take_apart(CONTENT)
-    whole = put_together(parts)
+    parts = anatomy.take_apart(CONTENT)
+    whole = anatomy.put_together(parts)
     assert attempt(whole) == [], "what is refused has a fault"
-    index = index_of(whole)
+    index = anatomy.index_of(whole)
     entry = next(body for opcode, body in index if opcode == Opcode.CHUNK_INDEX)
     moved = entry[:16] + struct.pack("<Q", 100) + entry[24:]
     for summary in (
@@ -211,7 +201,7 @@ def test_an_index_that_points_elsewhere() -> None:
         [*index, (Opcode.CHUNK_INDEX, moved)],
         [(op, body) for op, body in index if body != entry],
     ):
-        refusals = attempt(put_together(parts, summary))
+        refusals = attempt(anatomy.put_together(parts, summary))
         assert len(refusals) == len(READERS)
         assert all("index does not tell the records" in text for text in refusals)
 
@@ -271,7 +261,7 @@ def spliced(body: bytes, rng: random.Random) -> bytes:
 
 def mutated(rng: random.Random) -> bytes:
     """Return a log that is changed in one to three places, with checksums and digest that fit."""
-    parts, summary = take_apart(CONTENT), None
+    parts, summary = anatomy.take_apart(CONTENT), None
     for _ in range(rng.randint(1, 3)):
         part = rng.choice(parts)
         kind = rng.randrange(8)
@@ -285,11 +275,11 @@ def mutated(rng: random.Random) -> bytes:
             parts = rng.choice((without, [*parts, part], [part, *parts]))
     if rng.random() < 0.02:
         rng.choice(parts).length = rng.choice(SIZES)
-    if rng.random() < 0.2 and (summary := index_of(put_together(parts))):
+    if rng.random() < 0.2 and (summary := anatomy.index_of(anatomy.put_together(parts))):
         k = rng.randrange(len(summary))
         change = rng.choice((flipped, with_size, spliced))
         summary[k] = (summary[k][0], change(summary[k][1], rng))
-    return put_together(parts, summary)
+    return anatomy.put_together(parts, summary)
 
 
 def tries(folder: Path) -> Iterator[list[str]]:

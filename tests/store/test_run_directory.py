@@ -26,11 +26,10 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash
 from evoexp.shipped import shipped
-from evoexp.store import manifest as module
+from evoexp.store import identity as module
 from evoexp.store.files import NUM_THREADS
-from evoexp.store.identity import origin, run_context
+from evoexp.store.identity import git_state, manifest, origin, run_context
 from evoexp.store.log import Finished
-from evoexp.store.manifest import git_state, manifest
 from evoexp.store.run_directory import RunDirectory, lock_all, resolve
 from evoexp.store.summaries import summary_table
 from store_lookup import find_runs
@@ -265,7 +264,7 @@ def test_manifest_names_versions_and_processor_and_no_paths() -> None:
 
 
 def test_git_state_of_a_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    path = tmp_path / "src" / "evoexp" / "store" / "manifest.py"
+    path = tmp_path / "src" / "evoexp" / "store" / "identity.py"
     monkeypatch.setattr(module, "__file__", str(path))
     assert git_state.__wrapped__() is None, "an installed package has none"
     path.parent.mkdir(parents=True)

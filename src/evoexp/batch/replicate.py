@@ -12,8 +12,8 @@ from evoexp.errors import SettingError
 from evoexp.planners.answers import judge_motion
 from evoexp.records import Block, ReplicateSummary, blocks
 from evoexp.registry import guests
+from evoexp.store.identity import environment
 from evoexp.store.log import Finished, Log
-from evoexp.store.manifest import environment
 
 GENERATIONS = "generations"  # why a run ended that used all of them up
 BUDGET_SPENT = "collision queries"  # why a run ended whose next generation exceeds the budget
@@ -80,7 +80,6 @@ def run_replicate(
 
 
 def _judged(planner: Any, problem: Any, last: Block) -> dict[str, Any]:
-    """Judge the best motion on exact geometry; return the fields of a summary that tell of it."""
     begun_s, best = time.process_time(), last.bests[-1]
     verdict = judge_motion(planner, problem, planner.motion(problem, best.solution))
     certificate_s = time.process_time() - begun_s

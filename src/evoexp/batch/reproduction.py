@@ -22,9 +22,9 @@ from evoexp.planners.answers import judge_motion
 from evoexp.records import TIMES, ReplicateSummary, flatten
 from evoexp.registry import missing
 from evoexp.store.files import reason
+from evoexp.store.identity import differences
 from evoexp.store.log import ARRAY, array_bytes
 from evoexp.store.log_reader import LogContents, Place, decode_array, read_log
-from evoexp.store.manifest import differences
 
 TOLERANCE = 1e-9  # [-] by which numbers may differ: of their size, or absolutely if it is below 1
 ELSEWHERE = "in another environment"
@@ -94,7 +94,6 @@ class Comparison(NamedTuple):
 
     @property
     def _decisive(self) -> FieldDifference | None:
-        """The first difference that is none of rounding."""
         large = (each for each in self.fields if not (self.inexact and each.is_close))
         return next(large, None)
 

@@ -9,22 +9,17 @@ from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from evoexp.batch.jobs import (
-    Job,
-    Outcome,
-    cluster_fan_out,
-    fan_out,
-    one_of_each_kind,
-    warm_kernels,
-)
+from evoexp.batch import jobs
+from evoexp.batch.jobs import Job, Outcome
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import GIGABYTE, RunnerSettings, allowed_memory, refuse_large
 from evoexp.batch.workers import Workers, num_cores
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests
+from evoexp.store import identity
+from evoexp.store.identity import manifest
 from evoexp.store.integrity import lost_replicates, mend
-from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.summaries import damaged_logs, whole_logs, write_summary
 
@@ -94,8 +89,9 @@ class Batch:
                     for key, run in self.runs.items():
                         condition, _, notes = self._wanted[key]
                         config_json = condition.to_json()
-                        manifested = manifest(key, guests(config_json)) | notes
-                        run.create(config_json, manifested, condition.files())
+                        run.create(
+                            config_json, manifest_of(run, config_json) | notes, condition.files()
+                        )
                     for key in dict.fromkeys(job.condition_id for job in self.jobs):
                         self.runs[key].note_plan(self._wanted[key][1])
                     for outcomes in self._outcomes(workers):
@@ -118,14 +114,14 @@ class Batch:
         allowed = allowed_memory(self._settings, self.num_workers)
         least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
         limits = ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
-        kinds = one_of_each_kind(self.jobs)
+        kinds = jobs.one_of_each_kind(self.jobs)
         if workers is not None:
-            workers.call_first(warm_kernels, kinds, limits)
+            workers.call_first(jobs.warm_kernels, kinds, limits)
         elif self._settings.address is None:  # else the workers are elsewhere
-            warm_kernels(kinds, limits)
+            jobs.warm_kernels(kinds, limits)
         if self._settings.backend == "dask":
-            return cluster_fan_out(self.jobs, self._settings, limits)
-        return fan_out(self.jobs, workers, limits, self._curves)
+            return jobs.cluster_fan_out(self.jobs, self._settings, limits)
+        return jobs.fan_out(self.jobs, workers, limits, self._curves)
 
     @property
     def num_workers(self) -> int:
@@ -144,18 +140,17 @@ class Batch:
 
     def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
         """Return the jobs of missing replicates; references, which take longest, come first."""
-        jobs = []
+        missing_jobs = list[Job]()
         ordered = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)
         for key, (condition, count, _) in ordered:
             config_json, run = condition.to_json(), self.runs[key]
             files = tuple(condition.files().values())
             missing = (set(range(count)) - whole_logs(run)) | lost[key]
             missing -= set() if self._retry_failed else run.failed()
-            jobs += [Job(key, config_json, index, files) for index in sorted(missing)]
-        return jobs
+            missing_jobs += [Job(key, config_json, index, files) for index in sorted(missing)]
+        return missing_jobs
 
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
-        """Write failures and logs, and the table of a condition as soon as it is complete."""
         by_run: dict[str, dict[int, bytes]] = {}
         for outcome in outcomes:
             key, replicate = outcome.condition_id, outcome.replicate
@@ -174,3 +169,14 @@ class Batch:
         for key in keys:
             write_summary(self.runs[key], self._finished.pop(key, {}))
             self._summarised.add(key)
+
+
+def manifest_of(run: RunDirectory, config_json: bytes) -> dict[str, Any]:
+    """Return the manifest of a run to create.
+
+    Where it is lost, the first whole log tells the environment, and nothing the state of the code.
+    """
+    if not (run.path / identity.MANIFEST).exists():
+        for _, log in identity.whole_logs(run.path, run.condition_id):
+            return {"condition": run.condition_id, **log.environment, "git": None}
+    return manifest(run.condition_id, guests(config_json))

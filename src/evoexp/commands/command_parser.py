@@ -20,8 +20,9 @@ _DECLARED: dict[str, Any] = yaml.load(
 )
 COMMANDS: dict[str, str] = {name: command["summary"] for name, command in _DECLARED.items()}
 # where a module has another name, or the functions of several commands
-MODULES = dict.fromkeys(("view", "play", "export"), "chosen_motions") | {"list": "list_"}
-MODULES |= {"claims": "claim_list", "pack": "stored_runs"}
+MODULES = dict.fromkeys(("view", "play", "export", "evaluate"), "chosen_motions")
+MODULES |= dict.fromkeys(("verify", "clean"), "store_care")
+MODULES |= {"claims": "report", "list": "list_", "pack": "stored_runs"}
 HYDRAS_OPTIONS = {
     "--cfg": "evoexp show experiment=NAME; with --all every setting",
     "--info": "evoexp show experiment=NAME; evoexp list",

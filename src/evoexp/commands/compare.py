@@ -84,7 +84,6 @@ def drawn(
 
 
 def _asked(arguments: argparse.Namespace) -> build.Request:
-    """Return the request of the page."""
     words = shlex.join([*arguments.overrides, *option_words(arguments)])
     runs, experiments, _, settings = chosen(arguments)
     settings = settings.model_copy(update={"figures": "comparison"})

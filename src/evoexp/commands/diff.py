@@ -7,18 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.commands import stored_runs
 from evoexp.commands.console import new_table, print_json, say
-from evoexp.commands.stored_runs import (
-    NAMED,
-    in_archive,
-    looked_into,
-    shipped_experiment,
-    stored_or_shipped,
-)
 from evoexp.errors import UnknownHash, printable
 from evoexp.records import TIMES
-from evoexp.store.identity import TAKEN, typed_parts
-from evoexp.store.manifest import changed, differences
+from evoexp.store.identity import TAKEN, changed, differences, typed_parts
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 
@@ -68,18 +61,17 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _side(prefix: str) -> Side:
-    """Find a condition: in an archive, stored here, else shipped."""
-    if packed := in_archive(prefix):
-        with looked_into(*packed) as runs:
+    if packed := stored_runs.in_archive(prefix):
+        with stored_runs.looked_into(*packed) as runs:
             if len(runs) > 1:
-                choices = ", ".join(f"{prefix}:{run.hash12}" for run in runs[:NAMED])
+                choices = ", ".join(f"{prefix}:{run.hash12}" for run in runs[: stored_runs.NAMED])
                 raise UnknownHash(f"{prefix}: holds {len(runs)} runs; choose one: {choices}")
             found = _stored(runs[0])
             return found._replace(head=f"{printable(packed[0].name)}\n{found.head}")
-    run = stored_or_shipped(prefix)
+    run = stored_runs.stored_or_shipped(prefix)
     if isinstance(run, RunDirectory):
         return _stored(run)
-    condition = shipped_experiment(run).conditions[0].condition
+    condition = stored_runs.shipped_experiment(run).conditions[0].condition
     return Side(condition.id, json.loads(condition.to_json()), None, {}, run.condition_id[:12])
 
 
@@ -95,7 +87,6 @@ def _measured(row: Mapping[str, Any]) -> str:
 
 
 def _environment(one: Side, two: Side) -> list[tuple[str, Any, Any]]:
-    """Return the entries in which the environments of two runs differ."""
     if one.manifest is None or two.manifest is None:
         return []
     found = [

@@ -14,15 +14,9 @@ from evoexp.configuration import compose
 from evoexp.errors import MotionFileError, printable
 from evoexp.input_files import MEGABYTE, TableError, read_bounded, read_npy
 from evoexp.paths.motion import Motion
+from evoexp.playback import trajectory_files
 from evoexp.playback.recording import joints_of
-from evoexp.playback.trajectory_files import (
-    LARGEST,
-    JointTrajectory,
-    fitted,
-    parse_message,
-    read_columns,
-    read_message,
-)
+from evoexp.playback.trajectory_files import LARGEST, JointTrajectory, fitted, parse_message
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.log_reader import read_log
@@ -133,7 +127,7 @@ def read_motion(path: Path) -> Any:
             raise MotionFileError(f"{path}: a motion file ends in {ENDINGS}")
         content = read_bounded(path, MAX_MOTION)
         if path.suffix == ".csv":
-            return read_columns(content)
+            return trajectory_files.read_columns(content)
         if path.suffix == ".npy":
             values = read_npy(content).tolist()
         else:
@@ -147,7 +141,7 @@ def read_motion(path: Path) -> Any:
         raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
     if isinstance(values, dict):
         try:
-            return read_message(values)
+            return trajectory_files.read_message(values)
         except ValueError as error:
             raise MotionFileError(f"{path}: {error}") from None
     if (count := _num_values(values)) > MOST_VALUES:
@@ -159,7 +153,6 @@ def read_motion(path: Path) -> Any:
 
 
 def _num_values(values: Any) -> int:
-    """Return how many numbers and lists there are in nested lists, however deep."""
     count, lists = 0, [values] if isinstance(values, list) else []
     while lists:
         inner = lists.pop()

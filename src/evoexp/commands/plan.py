@@ -20,8 +20,7 @@ from evoexp.commands.console import hash_column, new_table, print_json, right, s
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import StoreError
-from evoexp.store.identity import CONFIG, read
-from evoexp.store.manifest import leaves
+from evoexp.store.identity import CONFIG, leaves, read
 from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
 from evoexp.store.summaries import damaged_logs, summary_table
 from evoexp.validation import TARGET
@@ -116,7 +115,6 @@ def _seconds(mean: float | None, least: float | None, most: float | None) -> str
 
 
 def _total(rows: Sequence[PlannedCondition], workers: int) -> str:
-    """Say how many replicates would run, and how long it would take."""
     missing, failed = sum(row.missing for row in rows), sum(row.failed for row in rows)
     again = f"{failed} failed before, which start with --retry-failed" if failed else ""
     if not missing:

@@ -1,4 +1,4 @@
-"""`evoexp report`: figures, tables and verdicts again, from the outputs alone."""
+"""`evoexp report`, figures, tables and verdicts from outputs alone; `evoexp claims`, verdicts."""
 
 import argparse
 import contextlib
@@ -10,10 +10,14 @@ import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
+from rich.table import Column
+
+from evoexp import registry
 from evoexp.commands import site
 from evoexp.commands.command_parser import command_parser, is_override, option_words
-from evoexp.commands.console import say, say_each
+from evoexp.commands.console import new_table, print_json, say, say_each
 from evoexp.commands.stored_runs import stored_runs, unpacked
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -21,8 +25,10 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError, UnknownOption
 from evoexp.report.pages import build
-from evoexp.report.pages.html_page import summaries
+from evoexp.report.pages.html_page import summaries, verdict_counts
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.report_settings import ReportSettings
+from evoexp.report.statistics.judging import Rules, registered_rules
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
@@ -69,7 +75,6 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
 
 
 def _check(reports: Iterable[build.ReportFiles]) -> int:
-    """Compare reports with what is on disk, and name every file that is not the same."""
     num_reports = num_files = num_wrong = 0
     for report in reports:
         wrong = []
@@ -246,3 +251,88 @@ def _again(folder: str, command: str) -> build.ReportFiles:
         if len(found) != 1:
             raise no_command
         return found[0].files(outputs_root())
+
+
+_OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "size", "n", "verdict")
+OURS = "our question"  # the source of what no paper claims
+PAPERS = registry.names(registry.CLAIMS)
+KEYS = ("paper", *_OF_CLAIM, "experiment", "command")
+
+
+def claims(arguments: argparse.Namespace) -> int:
+    """Print the claims that stored runs judge, then those that need a run."""
+    papers: dict[str, Rules] = {}
+    for paper in arguments.papers or registry.names(registry.CLAIMS):
+        if (registration := registry.registered(registry.CLAIMS, paper)) is None:
+            raise UnknownOption("paper", paper, registry.names(registry.CLAIMS))
+        papers[paper] = registered_rules(registration)
+    found = [row for paper, rules in papers.items() for row in claims_of(paper, rules)]
+    if arguments.json:
+        print_json(found)
+        return 0
+    for row in found:  # what is claimed, by which rule, from which numbers
+        title = f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}"
+        table = new_table(title, Column(no_wrap=True), "")
+        table.show_header = False
+        for key in ("claim", "source", "verdict", "size", "evidence", "n", "rule", "command"):
+            name = {"evidence": "numbers", "size": "decides"}.get(key, key)
+            table.add_row(name, row[key] or "–")
+        say(table)
+        say("")
+    ours = [row for row in found if row["source"].startswith(OURS)]
+    for name, rows in (("claims", [r for r in found if r not in ours]), ("our questions", ours)):
+        counts = verdict_counts(row["verdict"] for row in rows)
+        words = ", ".join(f"{count} {verdict}" for verdict, count in counts)
+        if rows:
+            say(f"{name} ({len(rows)}): {words}")
+    return 0
+
+
+def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
+    """Yield the claims of a paper, experiment by experiment, with `KEYS`.
+
+    A claim that is judged under every reading, by the experiment `<paper>_claims`, is yielded from
+    there alone, and a sentence once, from the first experiment that judges it, which has all its
+    conditions. Where a condition has no run, it names the command that runs its experiment.
+    """
+    known = set[str]()
+    judged: dict[str, set[str]] = {}  # rule → identities of the conditions of its experiments
+    experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
+    of_readings = f"{paper}_claims"
+    for experiment in sorted(experiments, key=lambda name: name != of_readings):
+        (expanded,) = compose.expand([f"experiment={experiment}"])
+        ids = {condition.id for _, condition in expanded.conditions}
+        own = [
+            rule.name
+            for rule in rules.values()
+            if experiment == of_readings or of_readings not in rule.experiments
+            if not ids <= judged.get(rule.name, set())
+        ]
+        try:
+            request = request_of(expanded, [])
+            results = request.results(outputs_root())
+            if len(results.with_data) < len(results.conditions):
+                raise NothingStored(experiment)  # of all conditions: claims compare them
+            claims = page_of(results, request.settings).claims
+            rows = [
+                (c.name, c.text, c.source, c.rule, c.evidence, str(c.size or "–"), c.n, c.verdict)
+                for c in claims
+                if c.name in own or c.name not in rules
+            ]
+            command = f"evoexp report {experiment}"
+            for name in own:
+                if experiment in rules[name].experiments:
+                    judged.setdefault(name, set()).update(ids)
+        except NothingStored:
+            waiting = [r.about() for r in rules.values() if experiment in r.experiments]
+            rows = [
+                (r.name, r.claim, r.source, r.text, "–", "–", "0", "not run")
+                for r in waiting
+                if r.name in own
+            ]
+            command = f"evoexp run experiment={experiment}"
+        for row in rows:
+            if row[1] in known:
+                continue
+            known.add(row[1])
+            yield dict(zip(KEYS, (paper, *row, experiment, command), strict=True))

@@ -6,23 +6,12 @@ from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
+from evoexp.batch import reproduction
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduction import (
-    Comparison,
-    fingerprint,
-    reproduce_log,
-    reproduce_stored,
-    same_fingerprint,
-)
+from evoexp.batch.reproduction import Comparison, fingerprint, reproduce_log, reproduce_stored
 from evoexp.batch.workers import Workers, in_order, num_cores
+from evoexp.commands import stored_runs
 from evoexp.commands.console import coloured, hash_column, new_table, right, say
-from evoexp.commands.stored_runs import (
-    finished_replicate,
-    in_archive,
-    looked_into,
-    shipped_experiment,
-    stored_or_shipped,
-)
 from evoexp.errors import NothingStored, RevisionMismatch, UnknownHash, printable
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -33,8 +22,8 @@ FEW = 8  # replicates below this are run here, without worker processes
 def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
     path = Path(arguments.what)
-    if packed := in_archive(arguments.what):
-        with looked_into(*packed) as runs:
+    if packed := stored_runs.in_archive(arguments.what):
+        with stored_runs.looked_into(*packed) as runs:
             rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
         code = _report(rows)
         told = f"{printable(str(packed[0]))}: its logs were compared where they are; nothing was"
@@ -43,7 +32,7 @@ def main(arguments: argparse.Namespace) -> int:
     if path.suffix == ".mcap" or path.is_file():
         return _report([reproduce_log(path)])
     try:
-        run = stored_or_shipped(arguments.what)
+        run = stored_runs.stored_or_shipped(arguments.what)
     except UnknownHash as error:
         raise UnknownHash(f"NOTHING TO COMPARE: {error}") from None
     if not isinstance(run, RunDirectory):
@@ -54,7 +43,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison]:
     try:
         if replicate is not None:
-            return _compare_all(run, [finished_replicate(run, replicate)])
+            return _compare_all(run, [stored_runs.finished_replicate(run, replicate)])
         if not run.completed():
             raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
         return _compare_all(run, sorted(run.completed()))
@@ -103,9 +92,9 @@ def _without_stored_run(row: Shipped, replicate: int | None) -> int:
             f"NOTHING TO COMPARE: replicate {replicate} of {row.condition_id[:12]} is neither "
             f"stored in {outputs_root()} nor in the shipped table, which holds replicate 0"
         )
-    condition = shipped_experiment(row).conditions[0].condition
+    condition = stored_runs.shipped_experiment(row).conditions[0].condition
     summary = run_replicate(condition, 0).summary
-    is_same = same_fingerprint(fingerprint(condition, summary), row.digest)
+    is_same = reproduction.same_fingerprint(fingerprint(condition, summary), row.digest)
     matches = is_same and condition.id == row.condition_id
     verdict = coloured("MATCH", "green") if matches else coloured("DIVERGES", "red")
     say(f"{row.condition_id[:12]} replicate 0 against the shipped table:", verdict)

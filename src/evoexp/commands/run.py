@@ -31,7 +31,7 @@ from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
 from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.pages import page_registration
-from evoexp.store.manifest import environment
+from evoexp.store.identity import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 USAGE = """evoexp: experiment: must be chosen, as in
@@ -93,7 +93,6 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:
-    """Return the conditions of an experiment that need no extra that is not there."""
     lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
     for label, what in lacks.items():
         if what:
@@ -156,7 +155,6 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
 
 
 def _drawn_from(experiment: Experiment, asked: Any, sources: str, directory: Path) -> str:
-    """Return a hash of all that a report follows from, and of its files."""
     conditions = [(label, condition.id) for label, condition in experiment.conditions]
     settings = (experiment.num_replicates, experiment.report, environment()["versions"])
     text = repr((conditions, settings, asked, sources, _stamps([directory])))

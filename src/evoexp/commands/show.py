@@ -20,31 +20,18 @@ from rich.table import Table
 
 from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
+from evoexp.commands import stored_runs
 from evoexp.commands.command_parser import is_override, option_words
-from evoexp.commands.console import (
-    hash_column,
-    new_table,
-    plain_console,
-    print_json,
-    right,
-    say,
-)
+from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
 from evoexp.commands.list_ import run_row, run_table
-from evoexp.commands.stored_runs import (
-    in_archive,
-    looked_into,
-    shipped_experiment,
-    stored_or_shipped,
-)
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, components_in, lacking, registered
-from evoexp.store.identity import ORIGIN, TAKEN, typed_parts
+from evoexp.store.identity import ORIGIN, TAKEN, differences, environment, leaves, typed_parts
 from evoexp.store.log_reader import LogContents, read_log
-from evoexp.store.manifest import differences, environment, leaves
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
@@ -85,9 +72,9 @@ def main(arguments: argparse.Namespace) -> int:
                 for experiment, label in labelled
             ]
             _print_screens(arguments, found)
-    elif packed := in_archive(" ".join(words)):
+    elif packed := stored_runs.in_archive(" ".join(words)):
         path, prefix = packed
-        with looked_into(path, prefix) as runs:
+        with stored_runs.looked_into(path, prefix) as runs:
             if as_table and len(runs) > 1:
                 say(run_table("", [run_row(run.hash12, run) for run in runs]))
                 say(f"one run on a screen: evoexp show {printable(str(path))}:{runs[0].hash12}")
@@ -99,11 +86,11 @@ def main(arguments: argparse.Namespace) -> int:
     elif (path := Path(words[0])).suffix == ".mcap" or path.is_file():
         _print_screens(arguments, [log_facts(path)])
     else:
-        run = stored_or_shipped(words[0])
+        run = stored_runs.stored_or_shipped(words[0])
         if isinstance(run, RunDirectory):
             _print_screens(arguments, [stored_facts(run, str(run.path))], [run])
         else:
-            facts = composed_facts(shipped_experiment(run), run.label, run.command)
+            facts = composed_facts(stored_runs.shipped_experiment(run), run.label, run.command)
             _print_screens(arguments, [facts])
     return 0
 
@@ -135,7 +122,6 @@ def _print_screens(
 
 
 def _condition_table(experiment: Experiment) -> Table:
-    """Return a table of an experiment's conditions and the settings in which they differ."""
     settings = []
     for _, condition in experiment.conditions:
         if not shipped.rows_of(condition.id) and not lacking(condition.to_json()):
@@ -338,7 +324,6 @@ def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
 
 
 def _component(component: Mapping[str, Any]) -> str:
-    """Say a component's revision, and its package unless it is evoexp's own."""
     revision, package = component["revision"], component["package"] or "not installed here"
     here = component["installed_revision"]
     remarks = [f"here {here}"] if here not in (None, revision) else []

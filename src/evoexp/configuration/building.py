@@ -16,8 +16,7 @@ from typing import Any
 from evoexp.condition import PARTS, Condition, read_files
 from evoexp.configuration.experiment import Budget
 from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
-from evoexp.configuration.refusals import chosen
-from evoexp.configuration.search_path import folders
+from evoexp.configuration.search_path import chosen, folders
 from evoexp.errors import SettingError, UnknownSetting
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class

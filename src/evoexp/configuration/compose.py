@@ -25,32 +25,19 @@ from omegaconf.errors import OmegaConfBaseException
 
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.configuration import overrides as syntax
+from evoexp.configuration import search_path
 from evoexp.configuration.building import build_settings, fill_in, planned_replicates
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
-from evoexp.configuration.overrides import (
-    ADD,
-    DELETE,
-    FORCE,
-    NOT_IDENTITY,
-    SCALARS,
-    Choice,
-    Override,
-    Value,
-    assigned,
-    collect,
-    expand_entry,
-    refuse_sweeps,
-    single_values,
-    sweep,
-)
-from evoexp.configuration.refusals import check_file, uncomposed, unparsed, without_header
-from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, is_file
-from evoexp.errors import EvoexpError, SettingError, UnknownSetting
+from evoexp.configuration.overrides import ADD, DELETE, NOT_IDENTITY, SCALARS, Choice, Override
+from evoexp.configuration.search_path import EXPERIMENT, chosen, find, groups, is_file, options
+from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
+from evoexp.input_files import MEGABYTE, read_bounded
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
-_PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
+_PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: syntax.FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 # parts of an entry of `conditions`, with what each is where it is left out
 PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
@@ -58,6 +45,11 @@ PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
 _JOB = ("launcher", "sweeper", "output", "help", "hydra_help", "hydra_logging", "job_logging")
 _NO_JOB = [f"~hydra/{group}" for group in _JOB]
 _COMPOSER = (HydraException, OmegaConfBaseException, yaml.YAMLError, ValueError, TypeError, OSError)
+HEADER = "# @package _global_"  # first line of an experiment file
+# of an option file, no larger, unfolded, than a person would write
+MAX_FILE = MEGABYTE  # the largest shipped option has 9 kB
+MOST_NESTED = 50  # lists and mappings in each other
+MOST_VALUES = 100_000  # once every alias (`*name`) stands for a copy of what it names
 
 
 def expand(
@@ -69,10 +61,10 @@ def expand(
         multirun: Whether values with commas are swept over.
         only: Labels to keep; empty keeps all.
     """
-    given = collect(map(parse, overrides))
-    refuse_sweeps(given, multirun=multirun)
+    given = syntax.collect(map(parse, overrides))
+    syntax.refuse_sweeps(given, multirun=multirun)
     asked = given.pop(EXPERIMENT, None)
-    names = [each.option() for each in single_values(asked)] if asked else [None]
+    names = [each.option() for each in syntax.single_values(asked)] if asked else [None]
     files = [None if name is None else find(EXPERIMENT, name) for name in names]
     if len({file and file.name for file in files}) < len(files):
         raise SettingError(EXPERIMENT, "names that differ", ",".join(map(str, names)))
@@ -83,7 +75,7 @@ def parse(text: str) -> Override:
     """Read one override."""
     key, equals, typed = text.partition("=")
     if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
-        return Override("", key, (Value(typed, typed),), False, text)
+        return Override("", key, (syntax.Value(typed, typed),), False, text)
     parser = OverridesParser.create()
     try:
         indexed = re.sub(r"\[(\d+)\]", r".\1", key)  # `a[0]` is `a.0`
@@ -100,7 +92,7 @@ def parse(text: str) -> Override:
     except (HydraException, ValueError, RecursionError):
         raise unparsed(text) from None
     is_bare = found.value_type is None  # a deletion
-    values = () if is_bare else tuple(map(Value, texts, map(_with_text_keys, data)))
+    values = () if is_bare else tuple(map(syntax.Value, texts, map(_with_text_keys, data)))
     return Override(_PREFIXES.get(found.type, ""), key, values, found.is_sweep_override(), text)
 
 
@@ -125,11 +117,11 @@ class Composer:
         self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options
         shutil.copy(shipped.config_directory() / "config.yaml", root)
         (root / EXPERIMENT).mkdir()
-        for folder in folders():
+        for folder in search_path.folders():
             if folder.origin != shipped.ORIGIN:
                 for path in sorted(folder.path.glob("*/*.yaml")):
                     check_file(path)
-        self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
+        self._path = ",".join(_quoted(f"file://{folder.path}") for folder in search_path.folders())
 
     def chosen(self, overrides: Choice) -> Composed:
         """Return the options that overrides choose, with the settings that these have."""
@@ -201,10 +193,9 @@ def _expand_one(file: Option | None, overrides: Choice, only: Sequence[str]) -> 
 
 
 def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Builder]:
-    """Return the settings that all conditions share, and the builder of the conditions."""
-    first = {key: each for key, each in next(sweep(overrides)).items() if key != FOLDER}
+    first = {key: each for key, each in next(syntax.sweep(overrides)).items() if key != FOLDER}
     shared_choice = concerning(first, compose.chosen(first).config)
-    config = assigned(compose.chosen(shared_choice).config, shared_choice)
+    config = syntax.assigned(compose.chosen(shared_choice).config, shared_choice)
     # settings outside the conditions may be taken from those of a condition
     shared = {name: config[name] for name in NOT_IDENTITY if name in config}
     base = fill_in(shared, config)
@@ -231,7 +222,7 @@ def _entries(conditions: Any) -> Iterator[Entry]:
         raise SettingError("conditions", "a mapping of labels to lists of overrides", conditions)
     for label, entry in (conditions or {"": []}).items():
         for template, overrides in readings(str(label), entry):
-            yield from expand_entry(template, map(parse, overrides))
+            yield from syntax.expand_entry(template, map(parse, overrides))
 
 
 def readings(label: str, entry: Any) -> Iterator[tuple[str, list[str]]]:
@@ -255,3 +246,106 @@ def readings(label: str, entry: Any) -> Iterator[tuple[str, list[str]]]:
     for first, second in itertools.product({**alone, **readings}, {**alone, **beside}):
         words = ", ".join(filter(None, (label, first, second)))
         yield words, [*own, *readings.get(first, ()), *beside.get(second, ())]
+
+
+# errors of the composer, each turned into one line that names a field and a remedy
+
+
+def unparsed(text: str) -> SettingError:
+    """Return the refusal of an override that cannot be read."""
+    key, equals, value = text.partition("=")
+    if not equals or not re.fullmatch(r"[~+]*[A-Za-z_][\w.\[\]]*", key):
+        return SettingError("override", "key=value", text)
+    must = "a number, a word, a [list], a {mapping} or 'any text' in quotes"
+    return SettingError(key.lstrip("+~"), must, value)
+
+
+def uncomposed(
+    error: Exception, choices: Mapping[str, str | None], file: Option | None
+) -> EvoexpError:
+    """Return the refusal of options (by group, as far as they were chosen) that do not compose."""
+    text, cause = str(error), error
+    while cause.__cause__ is not None and not isinstance(cause, yaml.MarkedYAMLError):
+        cause = cause.__cause__  # type: ignore[assignment]
+    if isinstance(cause, yaml.MarkedYAMLError) and (mark := cause.problem_mark) is not None:
+        must = f"a YAML file (line {mark.line + 1}: {cause.problem})"
+        return SettingError(EXPERIMENT, must, mark.name)
+    if file is not None and (refusal := _miswritten(file)) is not None:
+        return refusal
+    if missing := re.search(r"You must specify '([^']+)'", text):
+        group = missing[1]
+        if not choices.get(EXPERIMENT):
+            must = f"{chosen(EXPERIMENT)} (without one, every group is needed; the next is {group})"
+            return SettingError(EXPERIMENT, must, None)
+        return SettingError(group, chosen(group), None)
+    if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):
+        return UnknownOption(absent[1], absent[2], options(absent[1]))
+    if deleted := re.search(r"Could not delete '(([^=']+).*)'\.", text):
+        return SettingError(deleted[2], "an option that is chosen, to be deleted", f"~{deleted[1]}")
+    files = {group: name for group, name in choices.items() if name}
+    group = EXPERIMENT if EXPERIMENT in files else next(iter(files), EXPERIMENT)
+    reason = next(iter(text.strip().splitlines()), type(error).__name__)
+    must = f"an option whose file can be composed ({reason})"
+    return SettingError(group, must, files.get(group))
+
+
+def without_header(file: str) -> SettingError:
+    """Return the refusal of an experiment whose settings would not reach the configuration."""
+    return SettingError(EXPERIMENT, f"a file that begins with '{HEADER}'", file)
+
+
+def _miswritten(file: Option) -> EvoexpError | None:
+    content = Path(file.path).read_bytes()
+    if HEADER.encode() not in content.splitlines()[:1]:
+        return without_header(file.origin)
+    plain: Any = yaml.safe_load(content)
+    defaults = plain.get("defaults", []) if isinstance(plain, dict) else None
+    if not isinstance(defaults, list):
+        must = "a file of settings whose 'defaults' are a list of options"
+        return SettingError(EXPERIMENT, must, file.origin)
+    for entry in defaults:
+        for key, name in entry.items() if isinstance(entry, dict) else ():
+            group = str(key).removeprefix("override ").lstrip("/")
+            if str(key).startswith("override ") and group not in groups():
+                return UnknownOption("group", group, groups())
+            if group in groups() and name is not None and str(name) not in options(group):
+                return UnknownOption(group, str(name), options(group))
+    return None
+
+
+def check_file(path: Path) -> None:
+    """Refuse an option file that is too large, or that unfolds to too many values."""
+    try:
+        content = read_bounded(path, MAX_FILE)
+        unfolded = _num_values(yaml.parse(content, yaml.CSafeLoader))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError("option", f"a file that can be read ({reason})", str(path)) from None
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return  # told by whoever reads it, if anybody does
+    if unfolded > MOST_VALUES:
+        must = f"a file of at most {MOST_VALUES:,} values, aliases unfolded, {MOST_NESTED} deep"
+        raise SettingError("option", must, str(path))
+
+
+def _num_values(events: Iterator[yaml.Event]) -> int:
+    """Return how many values there are, aliases unfolded; very many if they are nested deeply."""
+    sizes: dict[str, int] = {}  # of what has a name
+    total, open_nodes = 0, list[tuple[str | None, int]]()  # (name, values before it)
+    for event in events:
+        if isinstance(event, yaml.AliasEvent):
+            total += sizes.get(event.anchor, MOST_VALUES)  # what is open yet would hold itself
+        elif isinstance(event, yaml.CollectionStartEvent):
+            open_nodes.append((event.anchor, total))
+            if len(open_nodes) > MOST_NESTED:
+                return MOST_VALUES + 1
+            total += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            name, before = open_nodes.pop()
+            if name is not None:
+                sizes[name] = total - before
+        elif isinstance(event, yaml.ScalarEvent):
+            total += 1
+            if event.anchor is not None:
+                sizes[event.anchor] = 1
+    return total

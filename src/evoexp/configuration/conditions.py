@@ -17,29 +17,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.attachments import located
+from evoexp.configuration import overrides as syntax
 from evoexp.configuration.building import MARK, condition_of
 from evoexp.configuration.experiment import Budget, Built
-from evoexp.configuration.overrides import (
-    AROUND,
-    DELETE,
-    JOIN,
-    PLANNER_PARTS,
-    Choice,
-    Override,
-    Value,
-    assigned,
-    known_instead,
-    short_names,
-    single_values,
-    sweep,
-    sweep_texts,
-)
-from evoexp.configuration.refusals import chosen
+from evoexp.configuration.overrides import DELETE, Choice, Override, known_instead, single_values
+from evoexp.configuration.search_path import chosen
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.shipped import Option
 
 SAME = " ≡ "  # between labels of one condition
-PLANNER = ("planner", *AROUND)  # groups whose option makes any label of a planner false
+PLANNER = ("planner", *syntax.AROUND)  # groups whose option makes any label of a planner false
 FOLDER, SCENE, REQUEST = "scenario.folder", "scenario.scene", "scenario.request"
 MOST_PROBLEMS = 10_000  # conditions of one call
 
@@ -112,31 +99,28 @@ class Builder(NamedTuple):
 
     def _built(self, choice: Choice) -> Built:
         config, options = self.composed(choice)
-        condition, is_capped = condition_of(assigned(config, choice), self.budget)
+        condition, is_capped = condition_of(syntax.assigned(config, choice), self.budget)
         return Built(condition, options, is_capped)
 
     def _crossed(self, overrides: Choice) -> Iterator[Crossed]:
-        """Yield the entries with each combination of the values that overrides have."""
         for entry, own in self.entries:
-            every = (self._concerning(combination, own) for combination in sweep(overrides))
+            every = (self._concerning(combination, own) for combination in syntax.sweep(overrides))
             # several are equal where a swept setting concerns other conditions
             different = {frozenset(each.word for each in typed.values()): typed for typed in every}
             for typed in different.values():
-                swept = sweep_texts(overrides, typed)
+                swept = syntax.sweep_texts(overrides, typed)
                 for problem, choice in _problem_choices({**own, **typed}):
                     label = _joined(entry, *swept.values(), problem) or self.name
                     yield Crossed(label, entry, frozenset(swept), own, typed, choice)
 
     def _concerning(self, choice: Choice, own: Choice) -> Choice:
-        """Return the overrides of the command line that concern a condition."""
         planner = str(self.composed({**own, **choice}).config.get("planner"))
-        parts = [key for key in choice if key in PLANNER_PARTS and choice[key].option()]
+        parts = [key for key in choice if key in syntax.PLANNER_PARTS and choice[key].option()]
         not_taken = {key for key in parts if f"{MARK}{key}" not in planner}
         choice = {key: each for key, each in choice.items() if key not in not_taken}
         return concerning(choice, self.composed({**own, **choice}).config)
 
     def _refuse_unused(self, overrides: Choice, rows: Sequence[Crossed]) -> None:
-        """Refuse an override of the command line that concerns none of the conditions."""
         for key, override in overrides.items():
             if any(key in row.typed for row in rows):
                 continue
@@ -182,7 +166,7 @@ def _problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
             raise SettingError(FOLDER, f"a folder with {request.name} beside every scene", folder)
         files = {}
         for key, path in ((SCENE, str(scene)), (REQUEST, str(request))):
-            files[key] = Override("", key, (Value(path, path),), False, f"{key}={path}")
+            files[key] = Override("", key, (syntax.Value(path, path),), False, f"{key}={path}")
         yield f"{scene.resolve().parent.name} {number}".strip(), rest | files
 
 
@@ -233,7 +217,7 @@ def _label(members: Sequence[Crossed], built: Built, overridden: set[str]) -> st
         return labels[0]  # others differ from it in what the budget caps
     # entries that do not say what is overridden, or else what all of them say
     true = [m for m in members if overridden.isdisjoint({*m.own, *PLANNER})] if overridden else []
-    parts = [member.label.split(JOIN) for member in true or members]
+    parts = [member.label.split(syntax.JOIN) for member in true or members]
     common = [part for part in parts[0] if all(part in other for other in parts)]
     name = _joined(*common, *_values(members[0], overridden))
     return name if overridden and name else SAME.join(labels)
@@ -241,10 +225,10 @@ def _label(members: Sequence[Crossed], built: Built, overridden: set[str]) -> st
 
 def _values(member: Crossed, overridden: set[str]) -> Iterator[str]:
     """Yield `name=value` of overridden settings; sweeps are part of the label anyhow."""
-    for key, name in short_names(sorted(overridden - member.swept)).items():
+    for key, name in syntax.short_names(sorted(overridden - member.swept)).items():
         override = member.typed[key]
         yield f"~{name}" if override.prefix == DELETE else f"{name}={override.values[0].text}"
 
 
 def _joined(*parts: str) -> str:
-    return JOIN.join(part for part in parts if part)
+    return syntax.JOIN.join(part for part in parts if part)

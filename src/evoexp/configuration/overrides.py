@@ -100,7 +100,6 @@ def collect(overrides: Iterable[Override]) -> dict[str, Override]:
 
 
 def _check_setting(override: Override) -> None:
-    """Refuse keys that are no setting of evoexp, or that no override may change."""
     key, text, roots = override.key, override.text, [*groups(), *SCALARS]
     if override.root == "hydra":
         part = next(iter(re.findall(r"hydra[./](\w+)", key)), "")
@@ -260,7 +259,6 @@ def _delete(config: dict[str, Any], override: Override) -> None:
 
 
 def _place(config: dict[str, Any], override: Override) -> tuple[Any, Any, Any]:
-    """Return the list or mapping of an overridden setting, its index or key, its present value."""
     node: Any = config
     *parents, last = override.key.split(".")
     for depth, part in enumerate(parents):

@@ -68,7 +68,6 @@ def folders() -> list[Folder]:
 
 
 def _declared(registration: Registration) -> Path:
-    """Return the folder that a package declares, without importing the package."""
     package, _, inner = registration.target.partition(":")
     with contextlib.suppress(ImportError, ValueError):
         spec = importlib.util.find_spec(package)
@@ -94,6 +93,13 @@ def options(group: str) -> list[str]:
     return sorted(
         {path.stem for folder in folders() for path in (folder.path / group).glob("*.yaml")}
     )
+
+
+def chosen(group: str) -> str:
+    """Return the requirement that an option of a group is chosen, with the options."""
+    if group == EXPERIMENT:
+        return f"chosen: experiment=NAME, one of {len(options(group))}: evoexp list"
+    return f"chosen: {', '.join(options(group))}"
 
 
 def find(group: str, name: str) -> Option:

@@ -28,10 +28,16 @@ from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.kinematics import frame_pose, local_pose
 from evoexp.robots.meshes import convex_shape, loaded_mesh
 from evoexp.scenarios.grid_motion import GridMotion
-from evoexp.scenarios.motion_tasks import ArmMotion, LinkMotion
+from evoexp.scenarios.motion_tasks import (
+    ArmMotion,
+    LinkMotion,
+    Phase,
+    PointGoal,
+    PoseGoal,
+    PostureTask,
+)
 from evoexp.scenarios.moveit import LinkGoal, MoveitTask
 from evoexp.scenarios.moveit_files import Pose
-from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
 
 ROUNDING = 1e-9  # [rad, m] by which an end may lie beyond a limit
 UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model

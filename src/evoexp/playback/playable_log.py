@@ -170,7 +170,6 @@ def _transforms(recording: Recording, k: int, now: int) -> Any:
 
 
 def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
-    """Return verdict, least clearance and contacts as messages, in the order of time."""
     verdict, unit = recording.verdict, recording.length_unit
     rows = [(0.0, Log.INFO, f"{recording.heading.title}: {ANSWERS[verdict.certified]}")]
     if verdict.certified is not False and verdict.clearance_at is not None:

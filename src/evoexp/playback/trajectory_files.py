@@ -201,7 +201,6 @@ def _by_joint(table: JointTrajectory, joints: Sequence[Joint], length_unit: str)
 
 
 def _meaning(rest: str, units: set[str]) -> tuple[str, bool] | None:
-    """Return unit, and whether it is a velocity, of what a head has behind a joint's name."""
     if not _REST.fullmatch(rest):
         return None
     words = _WORD.findall(rest)

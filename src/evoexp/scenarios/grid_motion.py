@@ -60,7 +60,6 @@ class GridMotion(Component):
         return self
 
     def _are_nodes(self, low: tuple[int, ...], high: tuple[int, ...]) -> bool:
-        """Return whether two nodes are inside the grid, the first nowhere above the second."""
         return all(0 <= a <= b < n for a, b, n in zip(low, high, self.size, strict=True))
 
     def blocked(self) -> np.ndarray:

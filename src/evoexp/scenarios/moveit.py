@@ -11,28 +11,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.attachments import (
-    SHA256,
-    File,
-    file_content,
-    keep,
-    located,
-    mesh_content,
-    package_folders,
-)
+from evoexp import attachments
+from evoexp.attachments import SHA256, File, file_content, keep, located, mesh_content
 from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
-from evoexp.scenarios import moveit_scene
-from evoexp.scenarios.moveit_files import (
-    MAX_SCENE,
-    REQUEST,
-    SCENE,
-    MessagePart,
-    Pose,
-    primitive_kind,
-    read_document,
-)
+from evoexp.scenarios import moveit_files, moveit_scene
+from evoexp.scenarios.moveit_files import SCENE, MessagePart, Pose, primitive_kind, read_document
 from evoexp.scenarios.moveit_scene import Frames, SceneMesh
 from evoexp.validation import Component, NonNegative, Positive
 
@@ -40,7 +25,7 @@ if TYPE_CHECKING:
     from evoexp.robots.assembly import LinkFrames
 
 HALF_TURN = 180.0  # [deg] an orientation within which is any orientation
-FILES = {"scene": SCENE, "request": REQUEST}  # settings → messages
+FILES = {"scene": SCENE, "request": moveit_files.REQUEST}  # settings → messages
 
 _paths: dict[str, str] = {}  # SHA-256 of a file → its path as it was given, for messages
 
@@ -86,7 +71,7 @@ class MoveitTask(Component):
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
         """Return settings with the contents of files in the place of their paths."""
         settings = dict(settings)
-        packages = package_folders(settings.pop("packages", None), f"{field}.packages")
+        packages = attachments.package_folders(settings.pop("packages", None), f"{field}.packages")
         for name, message in FILES.items():
             path = settings.get(name)
             if not isinstance(path, str | None):
@@ -94,7 +79,7 @@ class MoveitTask(Component):
             if path in (None, "???"):
                 must = f"given: the path of MoveIt's planning {name} (YAML)"
                 raise SettingError(f"{field}.{name}", must, None)
-            content = file_content(path, f"{field}.{name}", MAX_SCENE)
+            content = file_content(path, f"{field}.{name}", moveit_files.MAX_SCENE)
             settings[name] = {SHA256: keep(content)}
             _paths[settings[name][SHA256]] = path
             document = read_document(content, f"{field}.{name}: {path}", message)

@@ -19,15 +19,9 @@ from evoexp.errors import nearest
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import sincos
 from evoexp.records import FloatArray, IntArray
+from evoexp.scenarios import obstacles as solids
 from evoexp.scenarios.moveit_files import IDENTITY, MessagePart, Pose, primitive_kind
-from evoexp.scenarios.obstacles import (
-    BoxObstacle,
-    HalfSpaceObstacle,
-    HullObstacle,
-    Obstacle,
-    RodObstacle,
-    SphereObstacle,
-)
+from evoexp.scenarios.obstacles import HullObstacle, Obstacle, RodObstacle, SphereObstacle
 from evoexp.validation import Settings
 
 if TYPE_CHECKING:
@@ -256,7 +250,7 @@ def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
     center = _three(pose.position)
     if kind == "box":
         size, angles = _three(sizes), pose.angles
-        return BoxObstacle(shape="box", name=name, center=center, size=size, rotation=angles)
+        return solids.BoxObstacle(shape="box", name=name, center=center, size=size, rotation=angles)
     if kind == "sphere":
         return SphereObstacle(shape="sphere", name=name, center=center, radius=float(sizes[0]))
     if kind == "cone":  # a pyramid around it, its axis z, its middle half way up
@@ -278,7 +272,7 @@ def _plane(plane: MessagePart, pose: Pose, name: str) -> Obstacle:
     plane.require(size, f"a normal other than 0 of '{name}'", normal.tolist())
     point = pose.of_point(-d / size * normal)
     direction = Pose(pose.rotation, np.zeros(3)).of_point(normal)
-    return HalfSpaceObstacle(
+    return solids.HalfSpaceObstacle(
         shape="half_space", name=name, point=_three(point), normal=_three(direction)
     )
 

@@ -115,7 +115,6 @@ def take_in(path: Path, outputs: Path) -> list[TakenRun]:
 def _taken(
     file: BinaryIO, hash12: str, entries: dict[str, tarfile.TarInfo], archive: str, outputs: Path
 ) -> TakenRun:
-    """Take one run of an archive into a store: what it refers to, its configuration, its logs."""
     if CONFIG not in entries:
         raise ArchiveError(f"no archive of runs: run {hash12} is without {CONFIG}")
     beside = {name: _content(file, entries[name]) for name in _TEXTS if name in entries}

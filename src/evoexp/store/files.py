@@ -40,7 +40,6 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def _write(path: Path, temporary: Path, content: bytes) -> None:
-    """Write a file under its temporary name; return when it is on the disk."""
     with _named(path), open(temporary, "wb") as file:
         file.write(content)
         file.flush()

@@ -121,7 +121,6 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
 
 
 def _contradictions(log: LogContents) -> Iterator[str]:
-    """Yield the contradictions in a log whose checksums are right."""
     if hashlib.sha256(log.config_json).hexdigest() != log.condition_id:
         yield "altered: its configuration does not have the hash of its condition"
     for name, content in log.attachments.items():

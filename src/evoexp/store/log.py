@@ -20,19 +20,11 @@ import xxhash
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
+from evoexp import records
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.numeric.generator_state import state_bytes
-from evoexp.records import (
-    Best,
-    Block,
-    FloatArray,
-    FrontRow,
-    GenerationRow,
-    ReplicateSummary,
-    SolutionRow,
-    flatten,
-)
+from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 
 LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
 # of everything a log holds; raised when a reader of the old version would misunderstand
@@ -245,7 +237,7 @@ _JSON_TYPES: dict[Any, dict[str, Any]] = {
     float: {"type": "number"},
     bool: {"type": "boolean"},
     str: {"type": "string"},
-    FloatArray: {"type": "array", "items": {"type": "number"}},
+    records.FloatArray: {"type": "array", "items": {"type": "number"}},
 }
 
 
@@ -279,7 +271,7 @@ def encode_generation(row: GenerationRow) -> bytes:
 
 def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
     """Return the summary as metadata: every value one JSON text, terms in alphabetical order."""
-    row = flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
+    row = records.flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
     return encode_values(flagged(row))
 
 

@@ -72,7 +72,6 @@ def write_summary(
 
 
 def _write(run: RunDirectory, summary: _Summary) -> None:
-    """Write the table of a run, with its origin and settings behind its own columns."""
     table, sink = summary.table, pa.BufferOutputStream()
     for name, value in run_context(run.path, run.condition_id, table.column_names).items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool)

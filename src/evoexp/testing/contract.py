@@ -18,14 +18,7 @@ from numpy.typing import NDArray
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.evolution.operators.operator import (
-    Context,
-    Crossover,
-    Genome,
-    Mutation,
-    Operator,
-    Selection,
-)
+from evoexp.evolution.operators import operator as kinds
 from evoexp.planners.planner import MEMBERS, Reproducibility
 from evoexp.records import FloatArray, Generation, IntArray, generations
 from evoexp.store.log import Finished
@@ -279,28 +272,30 @@ def numbers_are_finite(condition: Condition) -> Iterator[Demand]:
 # operators
 
 
-def context_of(operator: Operator, uniforms: FloatArray, rate: float, genome: Genome) -> Context:
+def context_of(
+    operator: kinds.Operator, uniforms: FloatArray, rate: float, genome: kinds.Genome
+) -> kinds.Context:
     """Return the context of an operator in the initial generation, without normal deviates."""
-    return Context(uniforms, NOTHING, rate, 0.0, operator.settings, genome)
+    return kinds.Context(uniforms, NOTHING, rate, 0.0, operator.settings, genome)
 
 
 def selected(
-    operator: Selection, rng: np.random.Generator, costs: FloatArray, count: int
+    operator: kinds.Selection, rng: np.random.Generator, costs: FloatArray, count: int
 ) -> IntArray:
     """Return the indices of `count` parents, drawn by costs (individuals,)."""
     parents = np.full(count, -1)
     uniforms = rng.random(operator.num_uniforms(len(costs), count))
-    operator.select(costs, context_of(operator, uniforms, 1.0, Genome.of(NOTHING)), parents)
+    operator.select(costs, context_of(operator, uniforms, 1.0, kinds.Genome.of(NOTHING)), parents)
     return parents
 
 
 def crossed(
-    operator: Crossover,
+    operator: kinds.Crossover,
     rng: np.random.Generator,
     genomes: FloatArray,
     parents: IntArray,
     rate: float,
-    genome: Genome,
+    genome: kinds.Genome,
 ) -> FloatArray:
     """Return the offspring (genes, parents) of a population (genes, individuals)."""
     out = np.full((len(genomes), len(parents) + SPARE), np.nan)
@@ -311,11 +306,11 @@ def crossed(
 
 
 def mutated(
-    operator: Mutation,
+    operator: kinds.Mutation,
     rng: np.random.Generator,
     genomes: FloatArray,
     rate: float,
-    genome: Genome,
+    genome: kinds.Genome,
     progress: float = 0.0,
 ) -> FloatArray:
     """Return the mutants (genes, individuals) of individuals, at t / T = `progress`."""
@@ -329,7 +324,7 @@ def mutated(
     return out[:, :count]
 
 
-def check_operator(operator: Operator) -> None:
+def check_operator(operator: kinds.Operator) -> None:
     """Check the obligations of an operator on small populations.
 
     Parents are individuals; at the rate 0 nobody is changed; every gene is written and within its
@@ -341,25 +336,25 @@ def check_operator(operator: Operator) -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)
         count = int(rng.integers(0, SIZE))
-        if isinstance(operator, Selection):
+        if isinstance(operator, kinds.Selection):
             costs = np.where(rng.random(SIZE) < 0.3, np.inf, rng.random(SIZE))
             parents = selected(operator, rng, costs, count)
             _check(bool(((parents >= 0) & (parents < SIZE)).all()), operator, "draws individuals")
-        elif isinstance(operator, Crossover | Mutation):
+        elif isinstance(operator, kinds.Crossover | kinds.Mutation):
             _check_children(operator, rng, rng.integers(0, SIZE, count))
 
 
 def _check_children(
-    operator: Crossover | Mutation, rng: np.random.Generator, parents: IntArray
+    operator: kinds.Crossover | kinds.Mutation, rng: np.random.Generator, parents: IntArray
 ) -> None:
-    genome = Genome.of(np.sort(rng.uniform(-5.0, 5.0, (NUM_GENES, 2))))
+    genome = kinds.Genome.of(np.sort(rng.uniform(-5.0, 5.0, (NUM_GENES, 2))))
     low, high = genome.limits.T[:, :, None]
     genomes = rng.uniform(low, high, (NUM_GENES, SIZE))
     before = genomes[:, parents]
 
     def children(rate: float) -> FloatArray:
         numbers = np.random.default_rng(0)
-        if isinstance(operator, Crossover):
+        if isinstance(operator, kinds.Crossover):
             return crossed(operator, numbers, genomes, parents, rate, genome)
         return mutated(operator, numbers, before, rate, genome, 0.3)
 
@@ -369,6 +364,6 @@ def _check_children(
     _check(np.array_equal(found, children(0.8)), operator, "gives the same bits again")
 
 
-def _check(is_kept: bool, operator: Operator, obligation: str) -> None:
+def _check(is_kept: bool, operator: kinds.Operator, obligation: str) -> None:
     if not is_kept:
         raise ContractBroken(f"operator {operator.component!r}: is one that {obligation}")

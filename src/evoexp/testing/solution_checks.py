@@ -59,7 +59,6 @@ def solutions_have_the_documented_shape(condition: Condition) -> Iterator[Demand
 
 
 def _fits(size: int, shape: Any) -> bool:
-    """Return whether a flat solution of this size can have a documented shape."""
     if len(shape) and shape[0] is ...:
         return size > 0 and size % num_values(shape[1:]) == 0
     return size == num_values(shape)

@@ -20,7 +20,7 @@ from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import IDENTITY, compose, frame_pose, invert, pose_of
-from evoexp.scenarios import posture_task
+from evoexp.scenarios import motion_tasks
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, obstacle_hulls
 
 TOOL_UP, OBJECT_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -53,7 +53,7 @@ class Stage(NamedTuple):
     """One phase, begun."""
 
     number: int  # of the phase, from 0
-    phase: posture_task.Phase  # the phase
+    phase: motion_tasks.Phase  # the phase
     situation: Situation  # the places of all objects in it
     # index into the kinematic table, and local pose (12,), of the frame that is controlled
     controlled: tuple[int, FloatArray]
@@ -88,14 +88,14 @@ class Problem:
 
     assembly: Assembly  # the robot, built
     bodies: BodyModel  # its bodies, covered
-    task: posture_task.PostureTask  # the scenario
+    task: motion_tasks.PostureTask  # the scenario
     obstacles: ObstacleTable  # the obstacles at the start
     # covers of the objects that are grasped, by index, in their own frames, and shapes inside
     # them
     covers: dict[int, tuple[Cover, Cover]]
     # index into the kinematic table of the joint that moves the tool; its local pose (12,)
     tool: tuple[int, FloatArray]
-    phases: tuple[posture_task.Phase, ...]  # the phases of the task, subgoals included
+    phases: tuple[motion_tasks.Phase, ...]  # the phases of the task, subgoals included
     weights: FloatArray  # (phases, terms) of the cost
     objective: PostureCost  # the cost
     start: FloatArray  # (nq,) [rad]
@@ -107,7 +107,7 @@ class Problem:
     def begin(self, index: int, q: FloatArray, situation: Situation) -> Stage:
         """Begin a phase at posture q (nq,); stages are kept, verdict and terms need them again."""
         phase, (joint, local) = self.phases[index], self.tool
-        place = q.tobytes() if isinstance(phase.goal, posture_task.ShiftGoal) else b""
+        place = q.tobytes() if isinstance(phase.goal, motion_tasks.ShiftGoal) else b""
         key = index, situation.held, situation.poses.tobytes(), situation.grasp.tobytes(), place
         if key in self.memory:
             stage: Stage = self.memory[key]
@@ -233,7 +233,7 @@ class Problem:
         return self.task.allowed_penetration or 0.0
 
     def surroundings(
-        self, phase: posture_task.Phase, situation: Situation
+        self, phase: motion_tasks.Phase, situation: Situation
     ) -> tuple[ObstacleTable, tuple[tuple[int, int], ...], Carried | None]:
         """Return the obstacles, the pairs (body, obstacle) that may touch, the carried object."""
         names, bodies, held = self.task.names, self.bodies.names, situation.held
@@ -265,7 +265,7 @@ class Problem:
 
     def aim(
         self,
-        phase: posture_task.Phase,
+        phase: motion_tasks.Phase,
         q: FloatArray,
         situation: Situation,
         controlled: tuple[int, FloatArray],
@@ -275,14 +275,14 @@ class Problem:
         up = up / np.sqrt(np.sum(up * up))
         own_up = OBJECT_UP if situation.held >= 0 else TOOL_UP
         turn, zero = IDENTITY[:9].copy(), np.zeros(3)
-        if isinstance(goal, posture_task.ShiftGoal):
+        if isinstance(goal, motion_tasks.ShiftGoal):
             table = self.assembly.table
             now, way = frame_pose(table, *controlled, q), np.array(goal.offset, dtype=np.float64)
             if goal.frame == "tool":
                 tool = frame_pose(table, *self.tool, q)
                 way = compose(tool, np.concatenate([turn, way]))[9:] - tool[9:]
             return Aim(now[:9].copy(), now[9:] + way, zero, POINT, 0.0, 0.0, zero, up, own_up)
-        if isinstance(goal, posture_task.SurfaceGoal):
+        if isinstance(goal, motion_tasks.SurfaceGoal):
             k = self.task.names.index(goal.object)
             pose, kind, size = situation.poses[k], self.obstacles.kind[k], self.obstacles.size[k]
             place = pose[:9].copy(), pose[9:].copy(), pose[[2, 5, 8]]
@@ -291,10 +291,10 @@ class Problem:
             surface = ROUND if kind == CYLINDER else ROD
             return Aim(*place, surface, float(size[1]), float(size[0]), zero, up, own_up)
         point = np.array(goal.point, dtype=np.float64)
-        if isinstance(goal, posture_task.PoseGoal):
+        if isinstance(goal, motion_tasks.PoseGoal):
             turn = np.array(rotation_matrix(goal.rotation), dtype=np.float64).ravel()
             return Aim(turn, point, zero, POINT, 0.0, 0.0, zero, up, own_up)
-        if isinstance(goal, posture_task.PlaceGoal):
+        if isinstance(goal, motion_tasks.PlaceGoal):
             return Aim(turn, point, up, ROUND, 0.0, goal.radius, zero, up, own_up)
         surface = ROD if goal.radius > 0.0 else POINT
         return Aim(turn, point, zero, surface, 0.0, goal.radius, zero, up, own_up)
@@ -313,7 +313,7 @@ class Problem:
         ]
 
 
-def _are_among(phase: posture_task.Phase, one: str, two: str) -> bool:
+def _are_among(phase: motion_tasks.Phase, one: str, two: str) -> bool:
     return any({one, two} == set(pair) for pair in phase.contacts)
 
 

@@ -35,8 +35,8 @@ from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.planners.posture_es.problem import prepare
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
+from evoexp.scenarios.motion_tasks import PostureTask
 from evoexp.scenarios.moveit import MoveitTask
-from evoexp.scenarios.posture_task import PostureTask
 from evoexp.validation import Component, NonNegativeCount, Positive
 
 TERM_VALUES = 60  # numbers kept for an individual: terms, and what the kernels note of it

@@ -25,9 +25,7 @@ from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.kinematics import local_pose
-from evoexp.scenarios.moveit import MoveitTask
-from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
-from evoexp.scenarios.posture_task import (
+from evoexp.scenarios.motion_tasks import (
     Phase,
     PlaceGoal,
     PointGoal,
@@ -36,6 +34,8 @@ from evoexp.scenarios.posture_task import (
     ShiftGoal,
     SurfaceGoal,
 )
+from evoexp.scenarios.moveit import MoveitTask
+from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
 
 
 def prepare(

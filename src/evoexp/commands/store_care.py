@@ -1,19 +1,25 @@
-"""`evoexp verify`: whether a store is whole, and the commands that mend it."""
+"""`evoexp verify`, whether a store is whole; `evoexp clean`, which deletes what nobody needs."""
 
 import argparse
+import contextlib
 import itertools
+import json
+import shutil
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
 from evoexp.commands.stored_runs import in_archive, looked_into, stored_run
-from evoexp.errors import printable
-from evoexp.store.identity import CONFIG
+from evoexp.condition import revisions
+from evoexp.errors import Busy, StoreError, UnknownOption, printable
+from evoexp.store.files import is_set_aside, is_temporary
+from evoexp.store.identity import CONFIG, REPLICATES, read
 from evoexp.store.integrity import DELETE, LogCheck, RunCheck, check_log, check_run
-from evoexp.store.run_directory import COMMAND, outputs_root, run_names
+from evoexp.store.run_directory import COMMAND, RunDirectory, outputs_root, run_names
 from evoexp.store.summaries import altered
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
@@ -22,7 +28,7 @@ SHOWN = 4  # problems of a run
 RUN_KEYS = [name for name in RunCheck._fields if name != "run"]
 
 
-def main(arguments: argparse.Namespace) -> int:
+def verify(arguments: argparse.Namespace) -> int:
     """Check; exit code 1 if anything is damaged. Nothing is written."""
     outputs = outputs_root()
     archives = {word: packed for word in arguments.hashes if (packed := in_archive(word))}
@@ -108,3 +114,97 @@ def _checked(found: RunCheck, logs: list[LogCheck]) -> RunCheck:
         mend = rows[0].command if rows else known
     unevaluated = next((log.unevaluated for log in logs if log.unevaluated), "")
     return found._replace(problems=problems, logs=len(logs), mend=mend, unevaluated=unevaluated)
+
+
+MOST_LISTED = 20
+
+
+class Waste(NamedTuple):
+    """A file or folder that no command needs: what `--json` prints."""
+
+    kind: str  # why, one of `KINDS`
+    path: Path
+    bytes: int  # with everything in it [B]
+
+
+KEYS = Waste._fields
+KINDS = ("temporary", "damaged", "failed", "old_revision", "empty")
+USUAL = ("temporary", "damaged", "empty")
+
+
+def clean(arguments: argparse.Namespace) -> int:
+    """List, and delete if told so."""
+    kinds = list(dict.fromkeys(arguments.kinds)) or list(USUAL)
+    for kind in kinds:
+        if kind not in (*KINDS, "all"):
+            raise UnknownOption("kind", kind, [*KINDS, "all"])
+    wanted = set(KINDS) if "all" in kinds else set(kinds)
+    outputs = outputs_root()
+    found = [each for each in waste(outputs) if each.kind in wanted]
+    if arguments.json:
+        print_json([each._asdict() for each in found])
+    else:
+        _print_waste(found, outputs)
+    if arguments.yes:
+        _delete(found, outputs)
+    return 0
+
+
+def waste(outputs: Path) -> Iterator[Waste]:
+    """Yield everything that no command needs, run by run; nothing is deleted."""
+    runs = outputs / "runs"
+    for path in sorted(runs.iterdir()) if runs.is_dir() else ():
+        if path.is_dir() and path.name not in run_names(outputs):
+            others = [each for each in path.rglob("*") if each.is_file() and each.name != ".lock"]
+            if all(is_temporary(each.name) for each in others):
+                yield Waste("empty", path, _size(path))
+            continue
+        with contextlib.suppress(StoreError, ValueError, TypeError):  # of what is damaged
+            config = json.loads(read(path / CONFIG))
+            if any(stored != installed for _, stored, installed in revisions(config)):
+                yield Waste("old_revision", path, _size(path))
+                continue
+        for folder in (path, path / REPLICATES):
+            for each in sorted(folder.iterdir()) if folder.is_dir() else ():
+                kinds = {
+                    "temporary": is_temporary(each.name),
+                    "damaged": is_set_aside(each.name),
+                    "failed": each.name.endswith(".failed.json"),
+                }
+                if kind := next((kind for kind, is_own in kinds.items() if is_own), ""):
+                    yield Waste(kind, each, _size(each))
+
+
+def _size(path: Path) -> int:
+    if path.is_dir() and not path.is_symlink():
+        return sum(each.lstat().st_size for each in path.rglob("*") if not each.is_dir())
+    return path.lstat().st_size
+
+
+def _print_waste(found: list[Waste], outputs: Path) -> None:
+    if not found:
+        say(f"{outputs}: nothing to delete")
+        return
+    shown = ((w.kind, str(w.path.relative_to(outputs)), f"{w.bytes / 1000:.0f}") for w in found)
+    say(new_table("", "kind", "file", *right("kB"), rows=itertools.islice(shown, MOST_LISTED)))
+    more = f" ({len(found) - MOST_LISTED} more than shown)" if len(found) > MOST_LISTED else ""
+    size = sum(each.bytes for each in found) / 1e6
+    say(f"{len(found)} files or folders{more}, {size:.2f} MB")
+
+
+def _delete(found: list[Waste], outputs: Path) -> None:
+    """Delete, run by run; a run that another process writes is left alone."""
+    deleted = 0
+    for each in found:
+        name = each.path.relative_to(outputs / "runs").parts[0]
+        lock = RunDirectory(outputs, name + "0" * (64 - len(name))).lock()
+        try:
+            with lock:
+                if each.path.is_dir() and not each.path.is_symlink():
+                    shutil.rmtree(each.path)
+                else:
+                    each.path.unlink(missing_ok=True)
+                deleted += 1
+        except Busy:
+            say(f"run {name}: another process is writing it now; left alone")
+    say(f"deleted: {deleted}")

@@ -19,8 +19,7 @@ from evoexp.commands.console import new_table, plain_console, print_json, right,
 from evoexp.commands.motion_files import FittingMotion, fitting_motions, nested, stored_motion
 from evoexp.commands.stored_runs import finished_replicate, stored_run
 from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
-from evoexp.planners.answers import Listing
-from evoexp.planners.answers import judge_motion
+from evoexp.planners.answers import Listing, judge_motion
 from evoexp.playback.player_page import page
 from evoexp.playback.recording import Heading, Recording, record, record_motion
 from evoexp.playback.trajectory import SpeedLimits

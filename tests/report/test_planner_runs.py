@@ -17,6 +17,14 @@ from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.report.figures import effort_curves
+from evoexp.report.figures.effort_curves import (
+    Standing,
+    alike,
+    critical_difference,
+    effort_ratios,
+    friedman,
+    standing,
+)
 from evoexp.report.pages import comparison
 from evoexp.report.pages.comparison import Rated, as_csv
 from evoexp.report.report_settings import ReportSettings
@@ -34,14 +42,6 @@ from evoexp.report.results.planner_runs import (
 )
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.report.statistics.inference import Interval, Spread
-from evoexp.report.statistics.problem_ranks import (
-    Standing,
-    alike,
-    critical_difference,
-    effort_ratios,
-    friedman,
-    standing,
-)
 from evoexp.store.log_reader import read_log
 from report_samples import expand, made_up_runs, store
 

@@ -30,7 +30,7 @@ from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
 from evoexp.registry import COMPONENTS, lacking, registrations
-from evoexp.report.pages import page_registration
+from evoexp.report.report_settings import page_registration
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 

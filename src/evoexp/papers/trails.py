@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, style, surfaces
+from evoexp.report.figures import groups, motion_scenes, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.scenarios.obstacles import obstacle_table
@@ -130,5 +130,5 @@ def space(
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    look: dict[str, Any] = {"view": (22.0, -55.0), "label_pads": (-7, -7, -7), "ticks": (2, 4)}
-    return surfaces.space(figure, place, low, high, pad, unit, zoom=zoom, **look)
+    look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 4)}
+    return motion_scenes.space(figure, place, low, high, pad, unit, zoom=zoom, **look)

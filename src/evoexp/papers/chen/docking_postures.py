@@ -219,7 +219,7 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge the number, the angles, the torques and their ratio, as far as they are printed."""
     printed = case.printed
-    angles = _signed("({:g}, {:g})°".format(*printed.angles)) if printed.angles else ""
+    angles = "({:g}, {:g})°".format(*printed.angles).replace("-", "−") if printed.angles else ""
     on = partial(judge.on, case=case.name, figure=printed.figure, angles=angles)
     if not np.isnan(printed.value):
         yield judge_value(judge, case)
@@ -292,11 +292,7 @@ def _ratio(judge: Judge, case: Case, sizes: FloatArray, exact: FloatArray) -> Cl
 
 def triple(torques: FloatArray, digits: int) -> str:
     """Return torques in words: (−0.61, 1.13, −0.30)."""
-    return _signed(f"({', '.join(f'{torque:.{digits}f}' for torque in torques)})")
-
-
-def _signed(text: str) -> str:
-    return text.replace("-", "−")
+    return f"({', '.join(f'{torque:.{digits}f}' for torque in torques)})".replace("-", "−")
 
 
 def against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:

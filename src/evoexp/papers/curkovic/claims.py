@@ -15,15 +15,8 @@ from evoexp.report.pages.page_parts import Claim, Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import (
-    Comparison,
-    Family,
-    Measure,
-    by_column,
-    compared,
-    rows_by_name,
-)
+from evoexp.report.statistics import comparisons, judging
+from evoexp.report.statistics.comparisons import Comparison, Family, Measure, by_column, compared
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, Proportion, percentiles
 from evoexp.report.statistics.judging import Judge
 
@@ -381,7 +374,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         [("Largest against smallest radius", compared_radii)] if compared_radii else []
     ),
     # the comparisons in how fast or how far a method converges, by quantity
-    "converging_rows": lambda compared: rows_by_name(
+    "converging_rows": lambda compared: comparisons.rows_by_name(
         [one for one in compared if one.measure.name != COLLIDES]
     ),
     # the quantities by which claims are judged

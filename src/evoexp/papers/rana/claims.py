@@ -12,6 +12,7 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import overridden, parameters, planned_replicates
+from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.comparisons import Comparison, Family, Measure
@@ -161,7 +162,7 @@ def least_distances(condition: ConditionResults) -> str:
     exact, unit = measures.approaches(condition), condition.length_unit
     return ", ".join(
         f"{kind} {markdown.number(float(own['clearance'].min()))} {unit} at least (required "
-        f"{margin:g}, kept in {markdown.share(int(own['kept'].sum()), len(own))})"
+        f"{margin:g}, kept in {counted(own['kept'])})"
         for kind, (_, margin) in measures.kinds_of_pairs(condition).items()
         for own in (exact[exact["kind"] == kind],)
     )

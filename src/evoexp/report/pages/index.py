@@ -163,8 +163,8 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
     for c in results.conditions:
         solved, found = "–", c.verdicts
         if c.done:
-            interval = Proportion(c.solved, c.done).interval(settings.confidence)
-            solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
+            share = Proportion(c.solved, c.done)
+            solved = f"{share} ({markdown.percent(share.interval(settings.confidence))})"
         exact: tuple[object, ...] = ("–",) * 5
         if found.judged:
             proven = found.certified, found.refuted, found.undecided

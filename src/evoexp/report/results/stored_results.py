@@ -74,12 +74,13 @@ class ConditionResults:
     @functools.cached_property
     def generations(self) -> pd.DataFrame:
         """One row per generation of every finished replicate."""
-        return read_generations(self.run, self._finished)
+        return read_generations(self.run, self.summaries.index.tolist())
 
     @functools.cached_property
     def solutions(self) -> dict[int, FloatArray]:
         """Replicate → its best solution, flat."""
-        return {k: read_solution(self.run.log_path(k)).values for k in self._finished}
+        logs = {int(k): self.run.log_path(int(k)) for k in self.summaries.index}
+        return {k: read_solution(path).values for k, path in logs.items()}
 
     def first_solution(self, replicate: int) -> FloatArray:
         """Return the best of the initial population of a replicate."""
@@ -88,10 +89,6 @@ class ConditionResults:
     def array(self, name: str) -> NDArray[Any]:
         """Return an array attached to the log of the best replicate."""
         return read_log(self.run.log_path(self.best_replicate)).arrays()[name]
-
-    @property
-    def _finished(self) -> list[int]:
-        return [int(replicate) for replicate in self.summaries.index]
 
     @property
     def hash12(self) -> str:

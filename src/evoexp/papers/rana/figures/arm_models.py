@@ -14,7 +14,7 @@ from evoexp.papers import trails
 from evoexp.papers.rana import measures
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, records, rounded, style, surfaces
+from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -220,9 +220,9 @@ def draw_arm(table: pd.DataFrame) -> Figure:
         trails.draw_base(axes, links, "xyz")
     _name_points(axes, 0, links)
     size = np.array([table["radius"].max(), 0.0, 0.0])
-    ball = surfaces.triangles_of("sphere", size, None)
+    ball = motion_scenes.triangles_of("sphere", size, None)
     for centre in spheres[["x", "y", "z"]].to_numpy():
-        shades = surfaces.shaded(ball, colour, 0.25)
+        shades = motion_scenes.shaded(ball, colour, 0.25)
         figure.axes[0].add_collection(Poly3DCollection(ball + centre, facecolors=shades, lw=0))
     return figure
 

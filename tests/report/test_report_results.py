@@ -59,7 +59,7 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     np.testing.assert_array_equal(ga.first_solution(ga.best_replicate), solutions[0].values)
     assert len(ga.generations) == sum(len(log.generations) for log in logs)
     assert ga.code["version"] == run.manifest()["versions"]["evoexp"]
-    assert math.isnan(ga.spread("no such column").median)
+    assert math.isnan(ga.column("no such column")[0])
 
 
 def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: Path) -> None:

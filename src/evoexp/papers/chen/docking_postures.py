@@ -167,7 +167,6 @@ def result_row(case: Case) -> tuple[str, ...]:
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:
-    """Return the shares of costs near the optimum; empty if it is not known."""
     shares = (f"{100 * case.within(costs, close).share:.0f} %" for close in CLOSE)
     return "" if np.isnan(case.least) else f"({', '.join(shares)})"
 
@@ -250,7 +249,17 @@ def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
         told = {"own": triple(own, 4), "off": off}
         yield hearing.own(told, 1, off <= hearing.rule.limits["rounded"])
     if not np.isnan(printed.ratio):
-        yield _ratio(judge, case, np.abs(torques), np.abs(exact))
+        # the printed ratio of torques by the printed sizes, and by those of the optimum
+        sizes, exact = np.abs(torques), np.abs(exact)
+        hearing = on("torque_ratio", ratio=f"{printed.ratio:g}")
+        rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
+        lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
+        greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
+        ratio = float(exact.max() / exact.min())
+        off = 100.0 * (ratio / printed.ratio - 1.0)
+        told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
+        holds = bool(lowest <= printed.ratio <= greatest and abs(off) <= near)
+        yield hearing.own(told | {"own": ratio, "off": off}, 1, holds)
 
 
 def judge_value(judge: Judge, case: Case) -> Claim:
@@ -273,21 +282,6 @@ def judge_value(judge: Judge, case: Case) -> Claim:
         told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
         agrees = agrees or None
     return hearing.own(told, 1, agrees)
-
-
-def _ratio(judge: Judge, case: Case, sizes: FloatArray, exact: FloatArray) -> Claim:
-    """Judge the printed ratio of torques by the printed sizes, and by those of the optimum."""
-    printed = case.printed
-    words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
-    hearing = judge.on("torque_ratio", **words)
-    rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
-    lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
-    greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
-    own = float(exact.max() / exact.min())
-    off = 100.0 * (own / printed.ratio - 1.0)
-    told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
-    holds = bool(lowest <= printed.ratio <= greatest and abs(off) <= near)
-    return hearing.own(told | {"own": own, "off": off}, 1, holds)
 
 
 def triple(torques: FloatArray, digits: int) -> str:

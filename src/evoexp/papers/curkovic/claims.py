@@ -320,8 +320,9 @@ def _of_corner(judge: Judge, corner: Corner, gain: Gain, measure: Measure) -> li
     single += [("distinct_genomes", c) for c in by_index]
     single += [("frozen_hall", c) for c in corner.others if c.planner.ga.hall_frozen]
     first, *more = (
-        judge.on(rule, who=who, measure=name).better(judge.compared(hall, c, values), "lower")
+        judge.on(rule, who=who, measure=name).better(next(iter(rows), None), "lower")
         for rule, c in single
+        for rows in (compared([(hall, c)], values, judge.settings),)
     )
     told += f"; share of the hall's gain over nothing: {explained}"
     return [first, beyond.better_than_all(told, over_elites), *more]

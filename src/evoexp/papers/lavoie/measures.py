@@ -312,7 +312,6 @@ def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
 
 
 def _breeds_alone(condition: ConditionResults) -> bool:
-    """Whether a condition is the algorithm by mutation alone, a control."""
     return float(condition.planner.ga.crossover_rate) == 0.0
 
 

@@ -184,7 +184,6 @@ def _changing(conditions: Sequence[ConditionResults], name: str) -> list[Conditi
 def _difference(
     other: ConditionResults, compared: tuple[FamilyComparison, ...], names: dict[str, str]
 ) -> str:
-    """Return the differences of the first condition from another one in words."""
     rows = comparisons.rows_by_name(compared)
     told = [
         f"the median of {shown} differs by {markdown.number(row.median_difference)}, "

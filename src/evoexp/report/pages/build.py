@@ -232,14 +232,12 @@ def _tied(text: str) -> str:
 
 
 def _parts(word: str) -> list[str]:
-    """Return the parts between which a word may be broken."""
     if len(word) <= LONGEST_WORD:
         return [word]
     return re.findall(rf".{{1,{LONGEST_WORD - 1}}}[._/=:,]|.{{1,{LONGEST_WORD}}}", word)
 
 
 def _room(text: str) -> float:
-    """Return the room that a text takes on a line, in letters."""
     return len(text) + len(re.findall(WIDE_SIGNS, text)) / 2
 
 

@@ -185,7 +185,6 @@ def _alone(item: _Item, entry: Mapping[str, Any]) -> Claim:
 
 
 def _share(holds: Any) -> Proportion:
-    """Return a share as it is, or count the runs in which something holds, (done,) of truth."""
     return holds if isinstance(holds, Proportion) else counted(holds)
 
 

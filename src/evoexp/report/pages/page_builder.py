@@ -164,10 +164,7 @@ class PageBuilder:
                 pairs = [(by_label[one], by_label[two]) for one, two in known]
                 for row in each["measures"] if pairs else ():
                     of = measure(self.scope, *row)
-                    lower, named = of.lower_is_better, "{0.label} against {1.label}".format
-                    rows = comparisons.compared(
-                        pairs, of.values, settings, lower_is_better=lower, named=named
-                    )
+                    rows = of.compared(pairs, settings, named=comparisons.AGAINST)
                     yield f"{of.name}: {each['heading']}", rows
         for one in self.scope["compared"]:
             if one.rows:

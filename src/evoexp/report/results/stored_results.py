@@ -17,7 +17,6 @@ from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import WrappedPlanner
 from evoexp.records import FloatArray
-from evoexp.report.statistics.inference import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
@@ -194,10 +193,6 @@ class ConditionResults:
         if name not in self.summaries:
             return np.full(self.done, np.nan)
         return self.summaries[name].to_numpy(dtype=np.float64, na_value=np.nan)
-
-    def spread(self, name: str) -> Spread:
-        """Return median and quartiles of a column of the summaries."""
-        return spread(self.column(name))
 
 
 class Results(NamedTuple):

@@ -19,8 +19,8 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import option, planned_replicates
-from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, Values, compared
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import Comparison
 from evoexp.report.statistics.inference import Proportion, fisher_exact, newcombe, runs_for_shares
 from evoexp.shipped import config_directory, shipped
 
@@ -277,12 +277,6 @@ class Judge(NamedTuple):
     def level(self) -> float:
         """The level of every interval."""
         return self.settings.confidence
-
-    def compared(
-        self, first: ConditionResults, second: ConditionResults, values: Values
-    ) -> Comparison | None:
-        """Compare two conditions in a quantity, lower is better; None: one has no run."""
-        return next(iter(compared([(first, second)], values, self.settings)), None)
 
     def share(self, proportion: Proportion, decimals: int = 0) -> str:
         """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""

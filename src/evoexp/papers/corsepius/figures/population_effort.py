@@ -145,7 +145,6 @@ def _look(position: int) -> dict[str, Any]:
 
 
 def _keys(table: pd.DataFrame) -> list[Line2D]:
-    """Return an entry of the legend per task."""
     tasks = sorted(set(zip(table["position"], table["task"], strict=True)))
     return [style.key(name, **_look(position)) for position, name in tasks]
 

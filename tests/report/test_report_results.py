@@ -47,7 +47,7 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     labels = {c.label: c.is_control for c in results.conditions}
     assert labels == {"via-point GA": False, "random search": True, "multi-start": True}
     ga = results.conditions[0]
-    assert (ga.done, ga.planned, ga.failed) == (2, 2, 0) and results.main == (ga,)
+    assert (ga.done, ga.planned, ga.failures) == (2, 2, {}) and results.main == (ga,)
     run = RunDirectory(stored, ga.condition.id)
     assert Condition.from_json(run.config_json()) == ga.condition
     logs = [read_log(run.log_path(k)) for k in range(2)]
@@ -90,8 +90,8 @@ def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
     search.log_path(0).unlink()
     found = gather(tmp_path, experiment.conditions, 3, "rana_planar", "smoke", "")
     first, second, third = found.conditions
-    assert (first.done, first.failed, first.failures) == (1, 1, {1: "worker died"})
-    assert (second.done, second.failed, second.solutions) == (0, 0, {})
+    assert (first.done, first.failures) == (1, {1: "worker died"})
+    assert (second.done, second.failures, second.solutions) == (0, {}, {})
     assert found.with_data == (first, third)
 
 

@@ -21,7 +21,6 @@ from evoexp.report.results.stored_results import ConditionResults
 from evoexp.scenarios.obstacles import obstacle_table
 
 DASHES: Any = (0, (2, 1))
-DASHED: dict[str, Any] = {"linestyle": DASHES}
 WAY: dict[str, Any] = {"linestyle": ":", "linewidth": 0.9}
 WIDE, THIN = 2.4, 0.9  # [pt] of the last posture, and of those before
 

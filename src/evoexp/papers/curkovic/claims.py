@@ -302,7 +302,6 @@ def hall_claims(judge: Judge, corners: Sequence[Corner], gains: Sequence[Gain]) 
 
 
 def _of_corner(judge: Judge, corner: Corner, gain: Gain, measure: Measure) -> list[Claim]:
-    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
     name, values, *_ = measure
     who, (hall, *by_index) = f"{corner.name}: ", corner.halls
     over_elites = compared([(hall, c) for c in corner.elites], values, judge.settings)

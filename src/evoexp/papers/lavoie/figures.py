@@ -170,7 +170,6 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def _draw_postures(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw the start in black, each sub-path in a colour of its own, ends with their names."""
     links, touching, contacts = (
         rows[rows["element"] == element] for element in (LINK, TOUCHING, CONTACT)
     )

@@ -242,7 +242,6 @@ def first_percentage(judge: Judge, condition: ConditionResults, main: Group) -> 
 
 
 def _difference(own: Proportion, theirs: Proportion, level: float) -> str:
-    """Return how many points more our share has than the paper's, with its interval."""
     low, high = newcombe(own, theirs, level)
     points = (
         f"ours − printed {100 * (own.share - theirs.share):+.1f} "

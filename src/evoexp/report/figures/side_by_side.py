@@ -33,7 +33,7 @@ def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataF
     for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
             columns = {"quantity": name, "position": position, "condition": c.label}
-            runs = {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}
+            runs = {"replicate": c.summaries.index, "value": values(c), "failed": len(c.failures)}
             parts.append(pd.DataFrame(columns | runs))
     return pd.concat(parts, ignore_index=True)
 

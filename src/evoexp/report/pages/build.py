@@ -135,7 +135,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
                 "run": c.condition.id,
                 "planned": c.planned,
                 "done": c.done,
-                "failed": c.failed,
+                "failed": len(c.failures),
                 "run_code": c.code,
             }
             for c in drawing.conditions

@@ -58,7 +58,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
         "title": document.title,
         "command": document.command.removeprefix("evoexp "),
         "partial": dict(document.notices).get("Partial results", ""),
-        "failed": sum(run.failed for run in document.runs),
+        "failed": sum(len(run.failures) for run in document.runs),
         "headings": [*headings, *((each["figure"].title, each["anchor"]) for each in figures)],
         "claims": sentences,
         "questions": questions,

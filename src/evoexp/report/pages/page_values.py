@@ -49,9 +49,8 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "several": lambda results: len(results.with_data) > 1,  # there is something to compare
     "are_few": lambda results: len(results.evolved) <= FEW,
-    "whole": lambda conditions: (
-        comparisons.Family.of(conditions),
-    ),  # the first one against all others
+    # the first one against all others
+    "whole": lambda conditions: [comparisons.Family.of(conditions)],
     "played": lambda condition: (PlayedRun(condition, condition.best_replicate),),
     "judge": lambda results, settings, rules: judging.judge(results, settings, rules),
     "confidence": lambda settings: settings.confidence,  # of every interval, in (0, 1)

@@ -99,11 +99,6 @@ class ConditionResults:
         """Number of finished replicates."""
         return len(self.summaries)
 
-    @property
-    def failed(self) -> int:
-        """Number of failed replicates."""
-        return len(self.failures)
-
     def added(self, fixed: int) -> int:
         """Return how many finished replicates were asked for when results were there already."""
         known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
@@ -268,7 +263,7 @@ def gather(
         _read(outputs, label, condition, num_replicates, (options or {}).get(label))
         for label, condition in conditions
     )
-    if not any(condition.done or condition.failed for condition in found):
+    if not any(condition.done or condition.failures for condition in found):
         raise NothingStored(
             f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}"
         )

@@ -109,7 +109,6 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
 
 
 def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> None:
-    """Draw one line with intervals per task, side by side."""
     marks.dashed(axes, marked)
     share = table["kind"].iloc[0] == SHARE
     scale = 100.0 if share else 1.0

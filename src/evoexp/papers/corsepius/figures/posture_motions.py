@@ -119,7 +119,6 @@ def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> li
 
 
 def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any]:
-    """Return a row with a place, or with the two ends of a link."""
     row = {"element": element, "instant": instant, "name": name}
     return row | dict(zip([*PLACE, *PATH], places, strict=False))
 

@@ -247,7 +247,7 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     above.set_title("b  from above, with each arm's reach")
     turn = np.linspace(0.0, 2.0 * np.pi, 121)
     for (arm, instant), links in groups(table, ["arm", "instant"]):
-        colour, look = style.arm_colour(arm), trails.DASHED if instant else {}
+        colour, look = style.arm_colour(arm), {"linestyle": trails.DASHES} if instant else {}
         for place, names in ((axes, "xyz"), (above, "xy")):
             trails.draw_chain(place, links, colour, names, **look)
             trails.draw_base(place, links, names)

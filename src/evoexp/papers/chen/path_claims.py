@@ -271,10 +271,8 @@ def evolution(
         for row in rows
     )
     words: dict[str, object] = {"median": median, "best": best, "told": told, "gain": abs(gain)}
-    words |= {
-        "verb": "saves" if gain >= 0.0 else "loses",
-        "share": 100.0 * abs(gain) / medians[best],
-    }
+    words |= {"share": 100.0 * abs(gain) / medians[best]}
+    words |= {"verb": "saves" if gain >= 0.0 else "loses"}
     hearing = judge.on("path_evolution", condition=condition.label, controls=" and ".join(medians))
     return hearing.better_than_all(words, rows)
 

@@ -319,9 +319,8 @@ def capsule(start: FloatArray, end: FloatArray) -> tuple[pin.SE3, float]:
 
 def placed(triangles: FloatArray, pose: FloatArray) -> FloatArray:
     """Return triangles moved by a pose: position, quaternion x, y, z, w, (7,)."""
-    return np.asarray(
-        Rotation.from_quat(pose[3:]).apply(triangles.reshape(-1, 3)) + pose[:3]
-    ).reshape(triangles.shape)
+    turned = Rotation.from_quat(pose[3:]).apply(triangles.reshape(-1, 3))
+    return np.asarray(turned + pose[:3]).reshape(triangles.shape)
 
 
 def shaded(triangles: FloatArray, colour: Any, alpha: float) -> FloatArray:

@@ -311,9 +311,8 @@ def planner_names(
     unique = len(every) == len(conditions) and len(kinds) == num_names
     if unique and all(rest.values()) and num_names < len(conditions):
         return rest
-    different = [
-        own[0].condition.planner for own in grouped(conditions, lambda c: c.condition.planner)
-    ]
+    alike = grouped(conditions, lambda c: c.condition.planner)
+    different = [own[0].condition.planner for own in alike]
     names = {}
     for c in conditions:
         planner = c.condition.planner

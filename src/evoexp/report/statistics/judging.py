@@ -148,12 +148,10 @@ class Hearing(NamedTuple):
         """
         says = row.says(self.significance) if row else 0
         words = evidence(row, word) if row else "nothing to compare"
-        heard = self._replace(
-            rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
-        )
+        rule = self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         counted, would_do = row and row.num_runs, row and row.runs_to_decide(self.significance)
         judged = counted, says == 1, says == -1, _least_effect([row] if row else []), would_do
-        return heard._claim("better", told.replace("{}", words), *judged)
+        return self._replace(rule=rule)._claim("better", told.replace("{}", words), *judged)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
         """Judge a claim that a condition is better than each of several others."""

@@ -322,12 +322,9 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     # the paths of all runs of every weighting, faint, and those that stand out
     "path_panels": lambda groups: [
-        (
-            g.title,
-            g.main,
-            [*(Line(FAINT, each) for each in paths(g.main).values()), *known_lines(g)],
-        )
+        (g.title, g.main, [*faint, *known_lines(g)])
         for g in groups
+        for faint in ([Line(FAINT, each) for each in paths(g.main).values()],)
     ],
     # the first condition of each weighting against its others
     "group_families": lambda groups: [Family.of(group.conditions) for group in groups],

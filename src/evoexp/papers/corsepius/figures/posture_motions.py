@@ -164,9 +164,8 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
         for element, points, *rest in parts
         for n, (x, y) in enumerate(points)
     ]
-    table = rounded(
-        pd.DataFrame(rows, columns=["element", "order", "x", "y", "half_x", "half_y", "factor"])
-    )
+    names = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
+    table = rounded(pd.DataFrame(rows, columns=names))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.length_unit)
 
 

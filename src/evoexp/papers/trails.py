@@ -72,9 +72,8 @@ def draw_base(axes: Any, links: pd.DataFrame, names: str = "xy") -> None:
 
 def obstacle_edges(condition: ConditionResults, reach: float = 1.0) -> list[tuple[float, ...]]:
     """Return the edges of the outlines of a scene's obstacles: number, x, y, x_end, y_end."""
-    outlines = motion_geometry.obstacle_outlines(
-        obstacle_table(condition.scenario.obstacles), reach
-    )
+    table = obstacle_table(condition.scenario.obstacles)
+    outlines = motion_geometry.obstacle_outlines(table, reach)
     return [(k, *a, *b) for k, outline in enumerate(outlines) for a, b in pairwise(outline)]
 
 

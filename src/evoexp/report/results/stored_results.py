@@ -264,9 +264,8 @@ def gather(
         for label, condition in conditions
     )
     if not any(condition.done or condition.failures for condition in found):
-        raise NothingStored(
-            f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}"
-        )
+        told = f"nothing stored in {outputs}; try: {command}"
+        raise NothingStored(f"{experiment or 'report'}: {told}")
     return Results(experiment, budget, found, outputs)
 
 

@@ -62,9 +62,8 @@ def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
         for number, line in enumerate(lines):
             same = (*head, line.kind, line.text, number, line.share)
             rows += [(*same, x, y) for x, y in line.path.tolist()]
-    return pd.DataFrame(
-        rows, columns=["panel", "unit", "kind", "text", "number", "share", "x", "y"]
-    )
+    names = ["panel", "unit", "kind", "text", "number", "share", "x", "y"]
+    return pd.DataFrame(rows, columns=names)
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
@@ -146,9 +145,8 @@ def draw_places(table: pd.DataFrame) -> Figure:
         label = f"{rows['condition'].iloc[0]} (n = {rows['runs'].iloc[0]})"
         axes.bar(x, own, width=width, color=style.condition_colour(int(position)), label=label)
     axes.set_xticks(np.arange(len(values)), [f"{value:g}" for value in values])
-    axes.set(
-        xlabel="unsafeness Sᵢ of a node (1: far from everything)", ylabel="nodes per path, mean"
-    )
+    axes.set_xlabel("unsafeness Sᵢ of a node (1: far from everything)")
+    axes.set_ylabel("nodes per path, mean")
     axes.grid(visible=False, axis="x")
     style.legend_below(figure, [axes], min(count, 4))
     return figure

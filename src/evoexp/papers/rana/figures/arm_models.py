@@ -142,11 +142,9 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     least, (a, b) = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
     rows.append(("bodies", -1, *a[:2], *b[:2], np.nan, least))
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(
-        safety_distance=problem.security_margin,
-        instant=instant,
-        length_unit=condition.length_unit,
-    )
+    table = rounded(pd.DataFrame(rows, columns=names))
+    table = table.assign(safety_distance=problem.security_margin, instant=instant)
+    return table.assign(length_unit=condition.length_unit)
 
 
 def draw_circles(table: pd.DataFrame) -> Figure:

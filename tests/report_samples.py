@@ -15,11 +15,11 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.report.figures import style
-from evoexp.report.pages import build, page_registration
+from evoexp.report.pages import build
 from evoexp.report.pages.page_builder import PageBuilder, family_comparisons
 from evoexp.report.pages.page_file import Functions, Scope, read_page_file
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.report_settings import ReportSettings
+from evoexp.report.report_settings import ReportSettings, page_registration
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.judging import Hearing, Judge, Rule

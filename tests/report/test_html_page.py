@@ -7,19 +7,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from evoexp.report.pages import markdown
-from evoexp.report.pages.html_page import (
-    Paper,
-    ReportSummary,
-    StoredRun,
-    home_page,
-    html_page,
-    inline,
-    number_columns,
-    read_summary,
-    site,
-    verdict_counts,
-)
+from evoexp.report.pages import html_page, markdown
 from evoexp.report.pages.page_parts import Document, Drawing, PlayedRun, Player, Table, Verdict
 from html_reader import Page, markdown_tables
 from report_samples import shown_run, smoke_report
@@ -62,7 +50,7 @@ PLAIN = page_of("plain")
 
 
 def read(document: Document = PLAIN) -> Page:
-    return Page(html_page(document, {}))
+    return Page(html_page.html_page(document, {}))
 
 
 def skeleton(page: Page) -> tuple[list[str], set[str], set[str]]:
@@ -74,14 +62,14 @@ def skeleton(page: Page) -> tuple[list[str], set[str], set[str]]:
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_texts_of_strangers_are_only_text_and_read_back(text: str, tmp_path: Path) -> None:
-    content = html_page(page_of(text), {})
+    content = html_page.html_page(page_of(text), {})
     page = Page(content)
     assert skeleton(page) == skeleton(read())
     assert page.all("h1")[0].text == page.all("title")[0].text == text
     assert page.all("img", alt=text)
     assert page.tables()[0][1][0] == " ".join(text.replace("`<b>`", "<b>").split())
     (tmp_path / "index.html").write_bytes(content)
-    found = read_summary(tmp_path)
+    found = html_page.read_summary(tmp_path)
     assert (found.title, found.command, found.partial) == (text, f"report {text}", text)
     assert (found.claims, found.questions) == (((text, "reproduced"),), ())
     assert found.runs == ((HASH, text),)
@@ -98,15 +86,15 @@ FIELDS = '{"title": "t", "command": "", "partial": "", "failed": 0, "headings": 
 def test_a_page_of_nobody_is_no_report(data: str, tmp_path: Path) -> None:
     page = f'<script type="application/json" id="summary">{data}</script>'
     (tmp_path / "index.html").write_text(page)
-    assert read_summary(tmp_path) is None
+    assert html_page.read_summary(tmp_path) is None
 
 
 def test_codes_that_name_a_run_of_the_page_link_to_its_commands() -> None:
-    found = inline(f"`{HASH}` `ffffffffffff` {HASH}", frozenset([HASH]))
+    found = html_page.inline(f"`{HASH}` `ffffffffffff` {HASH}", frozenset([HASH]))
     link = f'<a href="#run-{HASH}"><code>{HASH}</code></a>'
     assert found == f"{link} <code>ffffffffffff</code> {HASH}"
-    assert inline("a `b") == "a `b"
-    assert inline("`a` `b") == "<code>a</code> `b"
+    assert html_page.inline("a `b") == "a `b"
+    assert html_page.inline("`a` `b") == "<code>a</code> `b"
 
 
 def test_heads_that_name_a_condition_link_to_its_run() -> None:
@@ -167,13 +155,13 @@ def test_a_page_begins_with_its_answers() -> None:
     ],
 )
 def test_columns_of_numbers_are_told_apart(cells: list[str], numeric: bool) -> None:
-    assert number_columns(["name"], [(cell,) for cell in cells])[0] is numeric
+    assert html_page.number_columns(["name"], [(cell,) for cell in cells])[0] is numeric
 
 
 def test_verdicts_are_counted_in_one_order() -> None:
     verdicts = ["not judged (budget smoke)", "contradicted", "reproduced", "not judged (no data)"]
     counts = (("reproduced", 1), ("contradicted", 1), ("not judged", 2))
-    assert verdict_counts(verdicts) == counts
+    assert html_page.verdict_counts(verdicts) == counts
 
 
 def test_failures_stand_at_the_top() -> None:
@@ -223,23 +211,27 @@ def test_a_report_in_html_says_what_it_says_in_markdown(
     assert known and files | known <= set(page.addresses())
 
 
-RANA = Paper("rana", "Rana 1995", "arms", ("rana_planar", "rana_puma", "lavoie"), {"rana_puma": 3})
+RANA = html_page.Paper(
+    "rana", "Rana 1995", "arms", ("rana_planar", "rana_puma", "lavoie"), {"rana_puma": 3}
+)
 CLAIMS = (("free", "reproduced"), ("short", "contradicted"), ("fast", "not judged (no runs)"))
-RUN = StoredRun(HASH, "rana_planar", "GA", "paper", 3, 20, 0)
+RUN = html_page.StoredRun(HASH, "rana_planar", "GA", "paper", 3, 20, 0)
 
 
-def summary(folder: str, command: str = "", picture: str = "") -> ReportSummary:
+def summary(folder: str, command: str = "", picture: str = "") -> html_page.ReportSummary:
     headings = (("Claims", "claims"), ("GA against others", "ga-against-others"))
     words, runs = command or f"report {folder}", ((HASH, "GA"),)
     about, ours = f"about {folder}", (("ours", "undecided"),)
-    return ReportSummary(folder, about, words, "", 0, headings, CLAIMS, ours, runs, picture)
+    return html_page.ReportSummary(
+        folder, about, words, "", 0, headings, CLAIMS, ours, runs, picture
+    )
 
 
 def test_a_card_counts_the_claims_of_whole_experiments() -> None:
     pictures = {"rana_planar": "fig_5.svg", "rana_planar+12345678": "scene.svg"}
     found = [summary(folder, picture=picture) for folder, picture in pictures.items()]
     found.append(summary("rana_three@smoke"))
-    (card,) = site(found, [RANA], [])["papers"]
+    (card,) = html_page.site(found, [RANA], [])["papers"]
     counts = (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
     ours = (("undecided", 1),)
     assert card["tallies"] == (("The paper's sentences", counts), ("Our questions", ours))
@@ -251,7 +243,9 @@ def test_a_card_counts_the_claims_of_whole_experiments() -> None:
 
 def test_reports_of_no_paper_stand_by_themselves() -> None:
     compared = summary("compare_rana_planar", "compare rana_planar")
-    others = site([summary("arena_rana"), compared, summary("ranaplanar")], [RANA], [])["others"]
+    others = html_page.site([summary("arena_rana"), compared, summary("ranaplanar")], [RANA], [])[
+        "others"
+    ]
     assert [(name, [each.folder for each in own], not_run) for name, own, not_run in others] == [
         ("Arenas and other experiments", ["arena_rana", "ranaplanar"], ["lavoie"]),
         ("Comparisons", ["compare_rana_planar"], []),
@@ -259,7 +253,7 @@ def test_reports_of_no_paper_stand_by_themselves() -> None:
 
 
 def test_an_experiment_that_was_not_run_says_its_command() -> None:
-    page = Page(home_page([summary("rana_planar")], [RANA], []))
+    page = Page(html_page.home_page([summary("rana_planar")], [RANA], []))
     commands = [each.text for each in page.all("code", class_="copy")]
     assert commands == [f"evoexp run experiment={name}" for name in ("rana_puma", "lavoie")]
 
@@ -276,7 +270,7 @@ def test_an_experiment_that_was_not_run_says_its_command() -> None:
 )
 def test_a_run_has_a_state(done: int, planned: int, failed: int, damage: str, state: str) -> None:
     run = RUN._replace(done=done, planned=planned, failed=failed, damage=damage)
-    page = Page(home_page([summary("rana_planar")], [RANA], [run]))
+    page = Page(html_page.home_page([summary("rana_planar")], [RANA], [run]))
     cells = dict(zip(*page.tables()[0], strict=True))
     counts = "" if damage else f": {done} of {planned}" + f", {failed} failed" * bool(failed)
     assert (cells["hash"], cells["replicates"]) == (HASH, state + counts)
@@ -287,7 +281,7 @@ def test_a_run_has_a_state(done: int, planned: int, failed: int, damage: str, st
 
 def test_partial_reports_are_named_at_the_top() -> None:
     partial = summary("rana_planar")._replace(partial="GA: 3 of 20 replicates done, 0 failed")
-    page = Page(home_page([partial, summary("rana_puma")], [RANA], []))
+    page = Page(html_page.home_page([partial, summary("rana_puma")], [RANA], []))
     (notice,) = page.all("div", class_="notice")
     assert "1 of 2 reports were drawn before all planned replicates were there" in notice.text
     assert "rana_planar" in notice.text and "rana_puma" not in notice.text
@@ -295,7 +289,7 @@ def test_partial_reports_are_named_at_the_top() -> None:
 
 
 def test_the_search_knows_titles_headings_claims_and_hashes() -> None:
-    content = home_page([summary("rana_planar")], [RANA], [RUN])
+    content = html_page.home_page([summary("rana_planar")], [RANA], [RUN])
     entries = json.loads(Page(content).all("script", id="search-index")[0].text)
     assert [(each["kind"], each["text"]) for each in entries] == [
         ("report", "about rana_planar"),
@@ -310,10 +304,12 @@ def test_the_search_knows_titles_headings_claims_and_hashes() -> None:
 def test_texts_of_strangers_are_only_text_at_home(text: str) -> None:
     pairs, runs = ((text, text),), ((HASH, text),)
     folder = text.replace("/", "")
-    hostile = ReportSummary(folder, text, text, text, 1, pairs, pairs, pairs, runs, "figure.svg")
+    hostile = html_page.ReportSummary(
+        folder, text, text, text, 1, pairs, pairs, pairs, runs, "figure.svg"
+    )
     run = RUN._replace(experiment=text, label=text, budget=text)
-    paper = Paper("rana", text, text, (f"rana_{text}",), {})
-    page = Page(home_page([hostile], [paper], [run]))
+    paper = html_page.Paper("rana", text, text, (f"rana_{text}",), {})
+    page = Page(html_page.home_page([hostile], [paper], [run]))
     tags = [each.tag for each in page.elements]
     assert tags.count("script") == 2 and not {"b", "img"} & set(tags)
     assert not [name for each in page.elements for name in each.attributes if name[:2] == "on"]

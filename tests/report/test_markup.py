@@ -17,8 +17,8 @@ from evoexp.commands.console import coloured, new_table, plain_console
 from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
 from evoexp.report.pages import markdown, page_values
+from evoexp.report.pages.build import PACKAGES, escaped, latex_tables
 from evoexp.report.pages.index import in_few_words, provenance
-from evoexp.report.pages.latex_tables import PACKAGES, escaped, latex_tables
 from evoexp.report.pages.page_parts import Document, Table, Verdict
 from report_samples import shown_run, smoke_report
 

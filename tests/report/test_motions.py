@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from evoexp.condition import Prepared
 from evoexp.playback.recording import Outline
 from evoexp.records import FloatArray
-from evoexp.report.figures import motion_scenes, surfaces
+from evoexp.report.figures import motion_scenes
 from evoexp.report.figures.style import drawn
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import Results
@@ -154,16 +154,19 @@ def volume(triangles: np.ndarray) -> float:
 def test_surfaces_have_the_volume_of_their_bodies(
     kind: str, size: tuple[float, ...], share: float
 ) -> None:
-    found, truth = volume(surfaces.triangles_of(kind, np.array(size), None)), share * np.pi
+    found, truth = volume(motion_scenes.triangles_of(kind, np.array(size), None)), share * np.pi
     assert found == pytest.approx(truth, rel=0.09)  # 14 pieces around: 3 % less at most each
     assert found <= truth * (1.0 + 1e-12)
 
 
 def test_a_large_mesh_is_drawn_by_corners_of_its_hull() -> None:
     points = np.random.Generator(np.random.PCG64(1)).normal(size=(5000, 3))
-    found = surfaces.corners_of(Outline("mesh", (), points, np.zeros((0, 3), np.int64)))
-    assert found is not None and len(found) <= surfaces.MOST_CORNERS
-    triangles, hull = surfaces.triangles_of("mesh", np.zeros(3), found), ConvexHull(points).volume
+    found = motion_scenes.corners_of(Outline("mesh", (), points, np.zeros((0, 3), np.int64)))
+    assert found is not None and len(found) <= motion_scenes.MOST_CORNERS
+    triangles, hull = (
+        motion_scenes.triangles_of("mesh", np.zeros(3), found),
+        ConvexHull(points).volume,
+    )
     assert 0.9 * hull < volume(triangles) <= hull + 1e-9
 
 

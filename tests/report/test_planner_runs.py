@@ -21,35 +21,16 @@ from evoexp.report.pages import comparison
 from evoexp.report.pages.comparison import Rated, as_csv
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import planner_runs
-from evoexp.report.results.planner_runs import (
-    MULTIPLES,
-    Answer,
-    PlannerRuns,
-    Problem,
-    answer_table,
-    answers_of,
-    motion_length,
-    of_results,
-    straight_line,
-)
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.report.statistics.inference import Interval, Spread
-from evoexp.report.statistics.problem_ranks import (
-    Standing,
-    alike,
-    critical_difference,
-    effort_ratios,
-    friedman,
-    standing,
-)
 from evoexp.store.log_reader import read_log
 from report_samples import expand, made_up_runs, store
 
 SOME = [
-    Answer(0, 0, 50, 1000, 9.0, 4.0, True, False),
-    Answer(0, 3, 200, 4000, 6.0, 4.0, True, True),
-    Answer(0, 7, 400, 8000, 5.0, 4.0, True, True),
-    Answer(2, 1, 100, 2000, 7.0, 4.0, False, True),
+    planner_runs.Answer(0, 0, 50, 1000, 9.0, 4.0, True, False),
+    planner_runs.Answer(0, 3, 200, 4000, 6.0, 4.0, True, True),
+    planner_runs.Answer(0, 7, 400, 8000, 5.0, 4.0, True, True),
+    planner_runs.Answer(2, 1, 100, 2000, 7.0, 4.0, False, True),
 ]
 
 
@@ -63,19 +44,19 @@ def both(stored: Path) -> Results:
     return gather(stored, labels, None, "", "", "")
 
 
-def names(runs: list[PlannerRuns]) -> list[tuple[str, str]]:
+def names(runs: list[planner_runs.PlannerRuns]) -> list[tuple[str, str]]:
     return [(own.planner, own.problem.name) for own in runs]
 
 
 def test_labels_that_tell_problem_and_planner_name_both(both: Results) -> None:
     want = [("GA", "two arms"), ("draws", "two arms"), ("GA", "three arms")]
-    assert names(of_results(both.evolved)) == want
+    assert names(planner_runs.of_results(both.evolved)) == want
 
 
 def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Results) -> None:
     labels = ("plain", "with draws", "three arms: three arms")
     other = [replace(c, label=label) for c, label in zip(both.evolved, labels, strict=True)]
-    assert names(of_results(other)) == [
+    assert names(planner_runs.of_results(other)) == [
         ("via_point_ga", "rana_planar"),
         ("random_search", "rana_planar"),
         ("via_point_ga", "three arms"),
@@ -84,28 +65,33 @@ def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Res
         replace(c, label=label, options=()) for c, label in zip(other, "aba", strict=True)
     ]
     scenario = both.evolved[0].condition.scenario.component
-    assert {n for _, n in names(of_results(unlabelled))} == {f"{scenario} 1", f"{scenario} 2"}
+    assert {n for _, n in names(planner_runs.of_results(unlabelled))} == {
+        f"{scenario} 1",
+        f"{scenario} 2",
+    }
 
 
 def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -> None:
     labels = ("small: two arms · GA", "small: two arms · B", "small: three arms · B")
     other = [replace(c, label=label) for c, label in zip(both.evolved, labels, strict=True)]
-    found = [planner for planner, _ in names(of_results(other))]
+    found = [planner for planner, _ in names(planner_runs.of_results(other))]
     assert found == ["via_point_ga", "random_search", "via_point_ga"]
 
 
 def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
-    table, spent = answer_table(SOME), np.array([9000.0, 9100.0, 9200.0])
-    assert tuple(table.columns) == Answer._fields
-    assert list(answer_table([]).dtypes) == list(table.dtypes)
-    runs = PlannerRuns("", Problem("p"), "", table, (0, 1, 2), spent, None)
+    table, spent = planner_runs.answer_table(SOME), np.array([9000.0, 9100.0, 9200.0])
+    assert tuple(table.columns) == planner_runs.Answer._fields
+    assert list(planner_runs.answer_table([]).dtypes) == list(table.dtypes)
+    runs = planner_runs.PlannerRuns(
+        "", planner_runs.Problem("p"), "", table, (0, 1, 2), spent, None
+    )
     assert runs.best_lengths.tolist() == [5.0, np.inf, 7.0]
     for most, first in ((np.inf, [4000.0, 9100.0, 2000.0]), (5.5, [8000.0, 9100.0, 9200.0])):
         effort, reached = runs.first_reached(most)
         assert effort.tolist() == first
         assert reached.tolist() == [True, False, most > 7.0]
-    assert straight_line(table) == 4.0
-    assert np.isnan(straight_line(table.assign(straight=[1.0, 2.0, 2.0, 2.0])))
+    assert planner_runs.straight_line(table) == 4.0
+    assert np.isnan(planner_runs.straight_line(table.assign(straight=[1.0, 2.0, 2.0, 2.0])))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -115,7 +101,7 @@ def test_lengths_are_those_of_many_short_steps(seed: int) -> None:
     for motion in (Motion(q), smooth):
         points = np.array([motion.at(t) for t in np.linspace(0.0, 5.0, 20_001)])
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-        assert motion_length(motion) == pytest.approx(steps, rel=1e-4)
+        assert planner_runs.motion_length(motion) == pytest.approx(steps, rel=1e-4)
 
 
 def test_answers_are_the_logged_improvements_judged(
@@ -123,12 +109,14 @@ def test_answers_are_the_logged_improvements_judged(
 ) -> None:
     monkeypatch.setattr(planner_runs, "cache_root", lambda: tmp_path)  # judged anew
     monkeypatch.setattr(planner_runs, "WORTH_WORKERS", 1)
-    together = answers_of(results.evolved)
+    together = planner_runs.answers_of(results.evolved)
     assert list(together) == [c.label for c in results.evolved]
     assert len([*(tmp_path / "answers").iterdir()]) == sum(c.done for c in results.evolved)
     for condition in results.evolved:
         found, (planner, problem) = together[condition.label], condition.prepared
-        assert found.equals(answers_of([condition])[condition.label])  # out of the cache
+        assert found.equals(
+            planner_runs.answers_of([condition])[condition.label]
+        )  # out of the cache
         for k, own in found.groupby("replicate"):
             log, summary = read_log(condition.run.log_path(k)), condition.summaries.loc[k]
             assert own["cpu_s"].tolist() == [log.cpu_s[index] for index in own["generation"]]
@@ -137,11 +125,11 @@ def test_answers_are_the_logged_improvements_judged(
             assert last["collision_queries"] <= summary["collision_queries"]
             assert (last["certified"], last["solved"]) == (summary["certified"], summary["solved"])
             assert bool(judge_motion(planner, problem, motion).certified) == last["certified"]
-            assert last["length"] == motion_length(motion) >= last["straight"] - 1e-9
+            assert last["length"] == planner_runs.motion_length(motion) >= last["straight"] - 1e-9
 
 
 def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results: Results) -> None:
-    runs = of_results(results.evolved)
+    runs = planner_runs.of_results(results.evolved)
     table, lengths = (
         effort_curves.share_table(runs),
         effort_curves.length_table(runs).groupby("planner")["median"].last(),
@@ -149,9 +137,9 @@ def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results
     for own, condition in zip(runs, results.evolved, strict=True):
         assert lengths[own.label] == pytest.approx(np.median(own.best_lengths))
         answers = own.table[own.table["certified"]]
-        targets = np.array(MULTIPLES) * straight_line(own.table)
+        targets = np.array(planner_runs.MULTIPLES) * planner_runs.straight_line(own.table)
         curve = table[table["planner"] == own.label]
-        assert curve["targets"].unique().tolist() == [len(MULTIPLES) * condition.done]
+        assert curve["targets"].unique().tolist() == [len(planner_runs.MULTIPLES) * condition.done]
         for x, share in zip(curve["collision_queries"], curve["share"], strict=True):
             good = answers[answers["collision_queries"] <= x].groupby("replicate")["length"].min()
             count = (good.to_numpy()[:, None] <= targets).sum()
@@ -163,7 +151,7 @@ def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results
 
 
 def test_shares_of_all_problems_are_the_mean_of_those_of_each(both: Results) -> None:
-    runs = of_results(both.evolved)
+    runs = planner_runs.of_results(both.evolved)
     table = effort_curves.problem_share_table(runs).astype(
         {"collision_queries": float, "share": float}
     )
@@ -213,7 +201,7 @@ def test_answers_that_are_no_motions_are_not_compared(
 
 
 def test_effort_in_other_coins(results: Results, settings: ReportSettings) -> None:
-    runs = of_results(results.evolved, {})
+    runs = planner_runs.of_results(results.evolved, {})
     for row, own, condition in zip(
         comparison.rated(runs, settings), runs, results.evolved, strict=True
     ):
@@ -254,22 +242,26 @@ COSTS = st.sampled_from([1.0, 2.0, 3.0, 4.0, np.inf])
 TABLES = arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS)
 
 
-def stands(lengths: np.ndarray, efforts: np.ndarray | None = None) -> Standing:
+def stands(lengths: np.ndarray, efforts: np.ndarray | None = None) -> effort_curves.Standing:
     problems = tuple(f"problem {k}" for k in range(len(lengths)))
     planners = tuple(f"planner {k}" for k in range(lengths.shape[1]))
-    return Standing(planners, problems, (), (), lengths if efforts is None else efforts, lengths)
+    return effort_curves.Standing(
+        planners, problems, (), (), lengths if efforts is None else efforts, lengths
+    )
 
 
 def test_mean_ranks_and_critical_differences_are_demsars() -> None:
     found = stands(1.0 - AREAS)
     assert found.mean_ranks.round(3).tolist() == [3.143, 2.0, 2.893, 1.964]
-    assert critical_difference(4, 14, 0.05) == pytest.approx(1.25, abs=0.005)
-    assert critical_difference(4, 14, 0.10) == pytest.approx(1.12, abs=0.005)
+    assert effort_curves.critical_difference(4, 14, 0.05) == pytest.approx(1.25, abs=0.005)
+    assert effort_curves.critical_difference(4, 14, 0.10) == pytest.approx(1.12, abs=0.005)
     # Tab. 5 (a): critical values of the two-tailed Nemenyi test at 0.05
     printed = (1.960, 2.343, 2.569, 2.728, 2.850, 2.949, 3.031, 3.102, 3.164)
     for planners, value in enumerate(printed, 2):
         scale = np.sqrt(planners * (planners + 1) / (6.0 * 14))
-        assert critical_difference(planners, 14, 0.05) / scale == pytest.approx(value, abs=1.5e-3)
+        assert effort_curves.critical_difference(planners, 14, 0.05) / scale == pytest.approx(
+            value, abs=1.5e-3
+        )
 
 
 def test_friedmans_statistic_is_that_of_the_formula() -> None:
@@ -278,22 +270,22 @@ def test_friedmans_statistic_is_that_of_the_formula() -> None:
     assert plain == pytest.approx(9.28, abs=0.01)  # as printed, without correction for ties
     ties = sum(n**3 - n for row in AREAS for n in np.unique(row, return_counts=True)[1])
     corrected = plain / (1.0 - ties / (14 * 4 * (4**2 - 1)))
-    assert friedman(1.0 - AREAS).statistic == pytest.approx(corrected)
-    assert friedman(np.full((6, 3), np.inf)) == (0.0, 1.0)
-    assert friedman(np.tile([1.0, 2.0, np.inf], (6, 1))).p_value < 0.01
+    assert effort_curves.friedman(1.0 - AREAS).statistic == pytest.approx(corrected)
+    assert effort_curves.friedman(np.full((6, 3), np.inf)) == (0.0, 1.0)
+    assert effort_curves.friedman(np.tile([1.0, 2.0, np.inf], (6, 1))).p_value < 0.01
 
 
 @given(TABLES)
 def test_ranks_count_who_is_better(lengths: np.ndarray) -> None:
-    ranks = stands(lengths).ranks
     better = (lengths[:, None, :] < lengths[:, :, None]).sum(axis=2)
     equal = (lengths[:, None, :] == lengths[:, :, None]).sum(axis=2)
-    assert np.array_equal(ranks, better + (equal + 1) / 2)
+    ranks = better + (equal + 1) / 2
+    assert np.array_equal(stands(lengths).mean_ranks, ranks.mean(axis=0))
 
 
 @given(TABLES)
 def test_profiles_count_problems(efforts: np.ndarray) -> None:
-    ratios = effort_ratios(efforts)
+    ratios = effort_curves.effort_ratios(efforts)
     for (i, j), effort in np.ndenumerate(efforts):
         assert ratios[i, j] == (np.inf if np.isinf(effort) else effort / efforts[i].min())
     table = effort_curves.profiles_table(stands(efforts))
@@ -307,7 +299,7 @@ def test_profiles_count_problems(efforts: np.ndarray) -> None:
 @given(st.lists(st.floats(1.0, 6.0), min_size=2, max_size=7), st.floats(0.1, 3.0))
 def test_groups_join_all_pairs_that_do_not_differ(ranks: list[float], difference: float) -> None:
     ranks = sorted(ranks)
-    groups = alike(ranks, difference)
+    groups = effort_curves.alike(ranks, difference)
     for i, j in itertools.combinations(range(len(ranks)), 2):
         joined = any(first <= i and j <= last for first, last in groups)
         assert joined == (ranks[j] - ranks[i] < difference)
@@ -315,14 +307,14 @@ def test_groups_join_all_pairs_that_do_not_differ(ranks: list[float], difference
         assert not (one[0] >= two[0] and one[1] <= two[1])  # none inside of another
 
 
-def runs_of(planner: str, problem: str, *lengths: float) -> PlannerRuns:
+def runs_of(planner: str, problem: str, *lengths: float) -> planner_runs.PlannerRuns:
     """Return runs whose one answer, where there is one, comes at a tenth of the effort."""
     rows = [(k, 10.0, length) for k, length in enumerate(lengths) if np.isfinite(length)]
     return made_up_runs(planner, problem, rows, [100.0] * len(lengths))
 
 
 def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
-    found = standing(
+    found = effort_curves.standing(
         [
             runs_of("A", "p", 1.0, 2.0, 9.0),
             runs_of("B", "p", *[3.0] * 50),
@@ -342,10 +334,10 @@ def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
 def test_a_planner_of_few_problems_is_not_ranked_and_costs_no_problem() -> None:
     runs = [runs_of(name, problem, 1.0) for problem in "pqrs" for name in "AB"]
     few = [runs_of("few", "p", 1.0), *(runs_of("few", f"own {k}", 1.0) for k in range(9))]
-    found = standing([*runs, *few])
+    found = effort_curves.standing([*runs, *few])
     assert (found.planners, found.outsiders) == (("A", "B"), ("few",))
     assert (found.problems, len(found.left_out)) == (tuple("pqrs"), 9)
-    half = standing([*runs, runs_of("half", "p", 1.0), runs_of("half", "q", 1.0)])
+    half = effort_curves.standing([*runs, runs_of("half", "p", 1.0), runs_of("half", "q", 1.0)])
     assert (half.planners, half.problems) == (("A", "B", "half"), ("p", "q"))
     assert half.left_out == ("r", "s") and not half.outsiders
 

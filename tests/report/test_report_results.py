@@ -47,7 +47,7 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     labels = {c.label: c.is_control for c in results.conditions}
     assert labels == {"via-point GA": False, "random search": True, "multi-start": True}
     ga = results.conditions[0]
-    assert (ga.done, ga.planned, ga.failed) == (2, 2, 0) and results.main == (ga,)
+    assert (ga.done, ga.planned, ga.failures) == (2, 2, {}) and results.main == (ga,)
     run = RunDirectory(stored, ga.condition.id)
     assert Condition.from_json(run.config_json()) == ga.condition
     logs = [read_log(run.log_path(k)) for k in range(2)]
@@ -59,7 +59,7 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     np.testing.assert_array_equal(ga.first_solution(ga.best_replicate), solutions[0].values)
     assert len(ga.generations) == sum(len(log.generations) for log in logs)
     assert ga.code["version"] == run.manifest()["versions"]["evoexp"]
-    assert math.isnan(ga.spread("no such column").median)
+    assert math.isnan(ga.column("no such column")[0])
 
 
 def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: Path) -> None:
@@ -90,8 +90,8 @@ def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
     search.log_path(0).unlink()
     found = gather(tmp_path, experiment.conditions, 3, "rana_planar", "smoke", "")
     first, second, third = found.conditions
-    assert (first.done, first.failed, first.failures) == (1, 1, {1: "worker died"})
-    assert (second.done, second.failed, second.solutions) == (0, 0, {})
+    assert (first.done, first.failures) == (1, {1: "worker died"})
+    assert (second.done, second.failures, second.solutions) == (0, {}, {})
     assert found.with_data == (first, third)
 
 

@@ -15,13 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, style, surfaces
+from evoexp.report.figures import groups, motion_scenes, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.scenarios.obstacles import obstacle_table
 
 DASHES: Any = (0, (2, 1))
-DASHED: dict[str, Any] = {"linestyle": DASHES}
 WAY: dict[str, Any] = {"linestyle": ":", "linewidth": 0.9}
 WIDE, THIN = 2.4, 0.9  # [pt] of the last posture, and of those before
 
@@ -73,9 +72,8 @@ def draw_base(axes: Any, links: pd.DataFrame, names: str = "xy") -> None:
 
 def obstacle_edges(condition: ConditionResults, reach: float = 1.0) -> list[tuple[float, ...]]:
     """Return the edges of the outlines of a scene's obstacles: number, x, y, x_end, y_end."""
-    outlines = motion_geometry.obstacle_outlines(
-        obstacle_table(condition.scenario.obstacles), reach
-    )
+    table = obstacle_table(condition.scenario.obstacles)
+    outlines = motion_geometry.obstacle_outlines(table, reach)
     return [(k, *a, *b) for k, outline in enumerate(outlines) for a, b in pairwise(outline)]
 
 
@@ -130,5 +128,5 @@ def space(
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    look: dict[str, Any] = {"view": (22.0, -55.0), "label_pads": (-7, -7, -7), "ticks": (2, 4)}
-    return surfaces.space(figure, place, low, high, pad, unit, zoom=zoom, **look)
+    look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 4)}
+    return motion_scenes.space(figure, place, low, high, pad, unit, zoom=zoom, **look)

@@ -5,8 +5,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, UnknownOption
+from evoexp.registry import PAGES, Registration, names, registered
 from evoexp.validation import Count, Positive, Settings
+
+GENERIC = "generic"  # page of an experiment that names none
 
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
@@ -37,3 +40,17 @@ class ReportSettings(Settings):
         if self.style is not None and not Path(self.style).is_file():
             raise SettingError("style", "the path of a matplotlib style file", self.style)
         return self
+
+
+def page_registration(settings: ReportSettings) -> Registration:
+    """Return the registration of the page that the settings name; nothing is imported.
+
+    Raises:
+        UnknownOption: If there is none of this name.
+        RegistrationError: If its package registered it wrongly.
+    """
+    name = settings.figures or GENERIC
+    registration = registered(PAGES, name)
+    if registration is None:
+        raise UnknownOption("report.figures", name, names(PAGES))
+    return registration

@@ -167,7 +167,6 @@ def result_row(case: Case) -> tuple[str, ...]:
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:
-    """Return the shares of costs near the optimum; empty if it is not known."""
     shares = (f"{100 * case.within(costs, close).share:.0f} %" for close in CLOSE)
     return "" if np.isnan(case.least) else f"({', '.join(shares)})"
 
@@ -219,7 +218,7 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge the number, the angles, the torques and their ratio, as far as they are printed."""
     printed = case.printed
-    angles = _signed("({:g}, {:g})°".format(*printed.angles)) if printed.angles else ""
+    angles = "({:g}, {:g})°".format(*printed.angles).replace("-", "−") if printed.angles else ""
     on = partial(judge.on, case=case.name, figure=printed.figure, angles=angles)
     if not np.isnan(printed.value):
         yield judge_value(judge, case)
@@ -250,7 +249,17 @@ def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
         told = {"own": triple(own, 4), "off": off}
         yield hearing.own(told, 1, off <= hearing.rule.limits["rounded"])
     if not np.isnan(printed.ratio):
-        yield _ratio(judge, case, np.abs(torques), np.abs(exact))
+        # the printed ratio of torques by the printed sizes, and by those of the optimum
+        sizes, exact = np.abs(torques), np.abs(exact)
+        hearing = on("torque_ratio", ratio=f"{printed.ratio:g}")
+        rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
+        lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
+        greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
+        ratio = float(exact.max() / exact.min())
+        off = 100.0 * (ratio / printed.ratio - 1.0)
+        told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
+        holds = bool(lowest <= printed.ratio <= greatest and abs(off) <= near)
+        yield hearing.own(told | {"own": ratio, "off": off}, 1, holds)
 
 
 def judge_value(judge: Judge, case: Case) -> Claim:
@@ -275,28 +284,9 @@ def judge_value(judge: Judge, case: Case) -> Claim:
     return hearing.own(told, 1, agrees)
 
 
-def _ratio(judge: Judge, case: Case, sizes: FloatArray, exact: FloatArray) -> Claim:
-    """Judge the printed ratio of torques by the printed sizes, and by those of the optimum."""
-    printed = case.printed
-    words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
-    hearing = judge.on("torque_ratio", **words)
-    rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
-    lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
-    greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
-    own = float(exact.max() / exact.min())
-    off = 100.0 * (own / printed.ratio - 1.0)
-    told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
-    holds = bool(lowest <= printed.ratio <= greatest and abs(off) <= near)
-    return hearing.own(told | {"own": own, "off": off}, 1, holds)
-
-
 def triple(torques: FloatArray, digits: int) -> str:
     """Return torques in words: (−0.61, 1.13, −0.30)."""
-    return _signed(f"({', '.join(f'{torque:.{digits}f}' for torque in torques)})")
-
-
-def _signed(text: str) -> str:
-    return text.replace("-", "−")
+    return f"({', '.join(f'{torque:.{digits}f}' for torque in torques)})".replace("-", "−")
 
 
 def against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:

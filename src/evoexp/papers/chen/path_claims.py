@@ -18,7 +18,8 @@ from evoexp.report.statistics.judging import Judge, Rules, evidence
 
 # name of a route (A, B, …; A is the most frequent) → keys of its paths
 Routes = dict[str, tuple[Any, ...]]
-DISTANCE, UNSAFENESS, COST = "term_distance", "term_unsafeness", "best_cost"
+TERMS = DISTANCE, UNSAFENESS = "term_distance", "term_unsafeness"  # of a path's cost
+COST = "best_cost"
 
 
 class Group(NamedTuple):
@@ -40,16 +41,6 @@ class Group(NamedTuple):
     def title(self) -> str:
         """Name and weights, over a panel."""
         return f"{self.name}  ε = {self.weights[0]:g}, λ = {self.weights[1]:g}"
-
-    @property
-    def optimum(self) -> float:
-        """Cost of the best path that the reference knows; NaN without a reference."""
-        return cost_known(self.truth)
-
-    @property
-    def bound(self) -> float:
-        """The greatest known lower bound of the cost of any path; NaN without a reference."""
-        return bound_known(self.truth)
 
     @property
     def best_path(self) -> list[FloatArray]:
@@ -280,10 +271,8 @@ def evolution(
         for row in rows
     )
     words: dict[str, object] = {"median": median, "best": best, "told": told, "gain": abs(gain)}
-    words |= {
-        "verb": "saves" if gain >= 0.0 else "loses",
-        "share": 100.0 * abs(gain) / medians[best],
-    }
+    words |= {"share": 100.0 * abs(gain) / medians[best]}
+    words |= {"verb": "saves" if gain >= 0.0 else "loses"}
     hearing = judge.on("path_evolution", condition=condition.label, controls=" and ".join(medians))
     return hearing.better_than_all(words, rows)
 

@@ -15,15 +15,8 @@ from evoexp.report.pages.page_parts import Claim, Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import (
-    Comparison,
-    Family,
-    Measure,
-    by_column,
-    compared,
-    rows_by_name,
-)
+from evoexp.report.statistics import comparisons, judging
+from evoexp.report.statistics.comparisons import Comparison, Family, Measure, by_column, compared
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, Proportion, percentiles
 from evoexp.report.statistics.judging import Judge
 
@@ -309,7 +302,6 @@ def hall_claims(judge: Judge, corners: Sequence[Corner], gains: Sequence[Gain]) 
 
 
 def _of_corner(judge: Judge, corner: Corner, gain: Gain, measure: Measure) -> list[Claim]:
-    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
     name, values, *_ = measure
     who, (hall, *by_index) = f"{corner.name}: ", corner.halls
     over_elites = compared([(hall, c) for c in corner.elites], values, judge.settings)
@@ -327,8 +319,9 @@ def _of_corner(judge: Judge, corner: Corner, gain: Gain, measure: Measure) -> li
     single += [("distinct_genomes", c) for c in by_index]
     single += [("frozen_hall", c) for c in corner.others if c.planner.ga.hall_frozen]
     first, *more = (
-        judge.on(rule, who=who, measure=name).better(judge.compared(hall, c, values), "lower")
+        judge.on(rule, who=who, measure=name).better(next(iter(rows), None), "lower")
         for rule, c in single
+        for rows in (compared([(hall, c)], values, judge.settings),)
     )
     told += f"; share of the hall's gain over nothing: {explained}"
     return [first, beyond.better_than_all(told, over_elites), *more]
@@ -381,7 +374,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         [("Largest against smallest radius", compared_radii)] if compared_radii else []
     ),
     # the comparisons in how fast or how far a method converges, by quantity
-    "converging_rows": lambda compared: rows_by_name(
+    "converging_rows": lambda compared: comparisons.rows_by_name(
         [one for one in compared if one.measure.name != COLLIDES]
     ),
     # the quantities by which claims are judged

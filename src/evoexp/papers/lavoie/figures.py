@@ -159,10 +159,8 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
         look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2, "label": "ellipses"}
         axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
     for row in records(rows[rows["element"] == BOX]):
-        x, y = (
-            [row.x, row.x_end, row.x_end, row.x, row.x],
-            [row.y, row.y, row.y_end, row.y_end, row.y],
-        )
+        x = [row.x, row.x_end, row.x_end, row.x, row.x]
+        y = [row.y, row.y, row.y_end, row.y_end, row.y]
         axes.plot(x, y, color=style.FAINT, label="inside of the box", zorder=1, **INSIDE)
     for row in records(rows[rows["element"] == TARGET]):
         point: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
@@ -170,7 +168,6 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def _draw_postures(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw the start in black, each sub-path in a colour of its own, ends with their names."""
     links, touching, contacts = (
         rows[rows["element"] == element] for element in (LINK, TOUCHING, CONTACT)
     )

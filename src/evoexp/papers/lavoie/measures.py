@@ -242,7 +242,6 @@ def first_percentage(judge: Judge, condition: ConditionResults, main: Group) -> 
 
 
 def _difference(own: Proportion, theirs: Proportion, level: float) -> str:
-    """Return how many points more our share has than the paper's, with its interval."""
     low, high = newcombe(own, theirs, level)
     points = (
         f"ours − printed {100 * (own.share - theirs.share):+.1f} "
@@ -312,7 +311,6 @@ def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
 
 
 def _breeds_alone(condition: ConditionResults) -> bool:
-    """Whether a condition is the algorithm by mutation alone, a control."""
     return float(condition.planner.ga.crossover_rate) == 0.0
 
 

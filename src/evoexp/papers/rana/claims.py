@@ -12,10 +12,11 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import overridden, parameters, planned_replicates
+from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.comparisons import Comparison, Family, Measure
-from evoexp.report.statistics.inference import Proportion, fisher_family
+from evoexp.report.statistics.inference import Proportion, fisher_family, spread
 from evoexp.report.statistics.judging import Judge, Rules
 
 PRINTED = "as printed"  # label of the printed setting among the ablations
@@ -128,9 +129,8 @@ def evolution_adds(
     rows = {row.quantity: row for row in comparisons.compared(pairs, BEST, judge.settings)}
     shown = [control for control in controls if control.label in rows]
     shown.sort(key=lambda control: float(np.median(BEST(control))))
-    fitness = " · ".join(
-        f"{c.label} {markdown.spread(c.spread('term_fitness'))}" for c in (condition, *shown)
-    )
+    found = {c.label: spread(c.column("term_fitness")) for c in (condition, *shown)}
+    fitness = " · ".join(f"{label} {markdown.spread(own)}" for label, own in found.items())
     straight = condition.evaluate(measures.straight_line(condition))["fitness"]
     told = [f"fitness F: {fitness} · straight line {markdown.number(straight)}"]
     for place, control in enumerate(shown):
@@ -161,7 +161,7 @@ def least_distances(condition: ConditionResults) -> str:
     exact, unit = measures.approaches(condition), condition.length_unit
     return ", ".join(
         f"{kind} {markdown.number(float(own['clearance'].min()))} {unit} at least (required "
-        f"{margin:g}, kept in {markdown.share(int(own['kept'].sum()), len(own))})"
+        f"{margin:g}, kept in {counted(own['kept'])})"
         for kind, (_, margin) in measures.kinds_of_pairs(condition).items()
         for own in (exact[exact["kind"] == kind],)
     )

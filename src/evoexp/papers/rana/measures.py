@@ -20,7 +20,6 @@ from evoexp.report.statistics import comparisons
 from evoexp.report.statistics.comparisons import FamilyComparison
 from evoexp.report.statistics.inference import Proportion
 
-UNEVENNESS = "term_unevenness_arm_"
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
 EVENNESS = "unevenness of the best, C3 + C4"
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
@@ -33,7 +32,7 @@ UNEVEN, EVEN = 2.0, 1.05  # ratios of the longest step of a path to its shortest
 
 
 # C3 + C4 + … of each run's best: sums of |step − mean step| (Eqs. 4, 5), (done,) [deg]
-unevenness = summed(UNEVENNESS)
+unevenness = summed("term_unevenness_arm_")
 
 
 def best_motion(condition: ConditionResults) -> FloatArray:
@@ -184,7 +183,6 @@ def _changing(conditions: Sequence[ConditionResults], name: str) -> list[Conditi
 def _difference(
     other: ConditionResults, compared: tuple[FamilyComparison, ...], names: dict[str, str]
 ) -> str:
-    """Return the differences of the first condition from another one in words."""
     rows = comparisons.rows_by_name(compared)
     told = [
         f"the median of {shown} differs by {markdown.number(row.median_difference)}, "

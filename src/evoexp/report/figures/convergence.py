@@ -101,21 +101,12 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
             wide, replicates = wide.ffill(), np.full(len(wide), wide.shape[1])
         median, lower, upper = quantiles(wide.to_numpy(np.float64), (0.5, 0.25, 0.75))
         spent = rows.pivot(index="index", columns="replicate", values="evaluations")
-        parts.append(
-            pd.DataFrame(
-                {
-                    "condition": condition.label,
-                    "position": results.position(condition.label),
-                    "quantity": NAMES[column],
-                    "generation": wide.index,
-                    "evaluations": quantiles(spent.to_numpy(np.float64), (0.5,))[0],
-                    "median": median,
-                    "lower": lower,
-                    "upper": upper,
-                    "replicates": replicates,
-                }
-            )
-        )
+        given: dict[str, Any] = {"condition": condition.label}
+        given |= {"position": results.position(condition.label), "quantity": NAMES[column]}
+        evaluations = quantiles(spent.to_numpy(np.float64), (0.5,))[0]
+        given |= {"generation": wide.index, "evaluations": evaluations, "median": median}
+        given |= {"lower": lower, "upper": upper, "replicates": replicates}
+        parts.append(pd.DataFrame(given))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -1,19 +1,23 @@
-"""Planners compared: shares of targets, best lengths, performance profiles, mean ranks."""
+"""Planners compared: shares of targets, best lengths, performance profiles, mean ranks.
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+Runs of one problem are no independent evidence that a planner is good elsewhere, so for profiles
+(Dolan and Moré 2002) and mean ranks (Demšar 2006) each problem gives a planner one number only.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy import stats
 
 from evoexp.records import FloatArray
 from evoexp.report.figures import marks, style
 from evoexp.report.figures.marks import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
-from evoexp.report.statistics import problem_ranks
-from evoexp.report.statistics.inference import quantiles
+from evoexp.report.statistics.inference import expected_effort, quantile, quantiles
 
 POINTS = 200  # along the axis of effort
 MAX_PANELS = 24  # problems that have a panel of their own
@@ -154,9 +158,115 @@ def draw_steps(
     style.log_axis(axes, first, max(last, 1.01 * first))
 
 
-def profiles_table(found: problem_ranks.Standing) -> pd.DataFrame:
+MIN_PLANNERS = 3  # of a critical-difference diagram: two are compared by a test of pairs
+MIN_PROBLEMS = 5  # of it: with fewer, Friedman's test can hardly reject anything
+
+
+class Friedman(NamedTuple):
+    """Friedman's test whether some planner ranks differently from the others."""
+
+    statistic: float  # χ², corrected for ties
+    p_value: float  # of the χ² distribution
+
+
+class Standing(NamedTuple):
+    """How planners stand on the problems that all of them were run on."""
+
+    planners: tuple[str, ...]  # their names
+    problems: tuple[str, ...]  # names of the problems
+    left_out: tuple[str, ...]  # problems that some of these planners was not run on
+    # Planners run on less than half of the problems that two planners were run on
+    outsiders: tuple[str, ...]
+    # Expected running time to a proven answer, (problems, planners) [collision queries]
+    efforts: FloatArray
+    # Median of the best proven lengths, (problems, planners); inf: half have none
+    lengths: FloatArray
+
+    @property
+    def can_be_profiled(self) -> bool:
+        """Whether there are planners and problems enough for a performance profile."""
+        return len(self.planners) > 1 and len(self.problems) > 1
+
+    @property
+    def can_be_tested(self) -> bool:
+        """Whether there are planners and problems enough for a critical-difference diagram."""
+        return len(self.planners) >= MIN_PLANNERS and len(self.problems) >= MIN_PROBLEMS
+
+    @property
+    def mean_ranks(self) -> FloatArray:
+        """Mean over problems of ranks by median length, (planners,); 1 is best, ties averaged."""
+        return np.asarray(stats.rankdata(self.lengths, axis=1).mean(axis=0))
+
+
+def standing(runs: Sequence[PlannerRuns]) -> Standing:
+    """Return how planners stand, each problem counted once."""
+    every = tuple(dict.fromkeys(own.planner for own in runs))
+    problems = problem_order(runs)
+    cells: dict[tuple[str, str], list[PlannerRuns]] = {}
+    for own in runs:
+        cells.setdefault((own.problem.name, own.planner), []).append(own)
+    contested = [name for name in problems if sum((name, each) in cells for each in every) > 1]
+    planners = tuple(
+        each
+        for each in every
+        if 2 * sum((name, each) in cells for name in contested) >= len(contested)
+    )
+    common = tuple(name for name in problems if all((name, each) in cells for each in planners))
+
+    def matrix(value: Callable[[Sequence[PlannerRuns]], float]) -> FloatArray:
+        rows = [[value(cells[name, each]) for each in planners] for name in common]
+        return np.array(rows, dtype=np.float64).reshape(len(common), len(planners))
+
+    def effort(same: Sequence[PlannerRuns]) -> float:
+        spent, reached = zip(*(own.first_reached() for own in same), strict=True)
+        return expected_effort(np.concatenate(spent), np.concatenate(reached))
+
+    def length(same: Sequence[PlannerRuns]) -> float:
+        return quantile(np.concatenate([own.best_lengths for own in same]), 0.5)
+
+    left_out = tuple(name for name in problems if name not in common)
+    outsiders = tuple(each for each in every if each not in planners)
+    return Standing(planners, common, left_out, outsiders, matrix(effort), matrix(length))
+
+
+def effort_ratios(efforts: FloatArray) -> FloatArray:
+    """Return each effort (problems, planners) over its problem's least (Dolan and Moré, Eq. 2.1).
+
+    Never solved are infinite ones, also where no planner solves the problem.
+    """
+    best = efforts.min(axis=1, keepdims=True)
+    ratios = np.full(efforts.shape, np.inf)
+    np.divide(efforts, best, out=ratios, where=np.isfinite(efforts) & (best > 0.0))
+    return np.where(efforts == best, np.where(np.isfinite(best), 1.0, np.inf), ratios)
+
+
+def friedman(lengths: FloatArray) -> Friedman:
+    """Test whether three planners or more rank alike (Friedman 1937), (problems, planners)."""
+    if (lengths == lengths[:, :1]).all():  # nothing but ties
+        return Friedman(0.0, 1.0)
+    found = stats.friedmanchisquare(*lengths.T)
+    return Friedman(float(found.statistic), float(found.pvalue))
+
+
+def critical_difference(num_planners: int, num_problems: int, significance: float) -> float:
+    """Return the difference of mean ranks that Nemenyi's test calls significant (Demšar 2006)."""
+    q = float(stats.studentized_range.ppf(1.0 - significance, num_planners, np.inf)) / np.sqrt(2.0)
+    return float(q * np.sqrt(num_planners * (num_planners + 1) / (6.0 * num_problems)))
+
+
+def alike(mean_ranks: Sequence[float], difference: float) -> list[tuple[int, int]]:
+    """Return (first, last) of the groups of ascending ranks that do not differ significantly."""
+    groups: list[tuple[int, int]] = []
+    for first, low in enumerate(mean_ranks):
+        last = max(k for k, rank in enumerate(mean_ranks) if rank - low < difference)
+        if last > first and (not groups or last > groups[-1][1]):
+            groups.append((first, last))
+    return groups
+
+
+def profiles_table(found: Standing) -> pd.DataFrame:
     """Return the performance profile of each planner, at every ratio at which one rises."""
-    ratios = problem_ranks.effort_ratios(found.efforts)
+    ratios = effort_ratios(found.efforts)
     steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
     axis = np.append(steps, max(END * steps[-1], 2.0))
     rows = [
@@ -178,12 +288,12 @@ def draw_profiles(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def critical_difference_table(found: problem_ranks.Standing, significance: float) -> pd.DataFrame:
+def critical_difference_table(found: Standing, significance: float) -> pd.DataFrame:
     """Return mean ranks, best first, with the critical difference."""
     table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
     table["problems"] = len(found.problems)
-    table["friedman_p"] = problem_ranks.friedman(found.lengths).p_value
-    table["critical_difference"] = problem_ranks.critical_difference(
+    table["friedman_p"] = friedman(found.lengths).p_value
+    table["critical_difference"] = critical_difference(
         len(found.planners), len(found.problems), significance
     )
     return table.sort_values("mean_rank", kind="stable", ignore_index=True)
@@ -192,7 +302,7 @@ def critical_difference_table(found: problem_ranks.Standing, significance: float
 def draw_critical_difference(table: pd.DataFrame) -> Figure:
     """Draw mean ranks on a line; a bar joins planners that do not differ significantly."""
     ranks, difference = table["mean_rank"].tolist(), float(table["critical_difference"].iloc[0])
-    groups, count = problem_ranks.alike(ranks, difference), len(ranks)
+    groups, count = alike(ranks, difference), len(ranks)
     left = (count + 1) // 2  # planners named on the left
     foot = BAR * (len(groups) + 1) + LINE * left  # [inch] below the axis
     figure = style.figure(ABOVE + foot)

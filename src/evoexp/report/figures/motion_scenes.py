@@ -3,21 +3,26 @@
 Every table of bodies has one row per body and place; the functions that draw need nothing else.
 """
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pinocchio as pin
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
 
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.playback.colours import OBJECT, OBSTACLE
 from evoexp.playback.recording import Outline, Recording, Shape
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, records, rounded, style, surfaces
+from evoexp.report.figures import groups, records, rounded, style
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
@@ -55,7 +60,7 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.Da
         own = []
         for joint, start, end, radius in covers:  # spheres, or capsules between two points
             place = pin.XYZQUATToSE3(frames[joint - 1]) if joint > 0 else pin.SE3.Identity()
-            pose, length = surfaces.capsule(start, end)
+            pose, length = capsule(start, end)
             drawn = Outline("sphere", (float(radius),))
             if length:
                 drawn = Outline("capsule", (float(radius), length))
@@ -107,7 +112,7 @@ def _still(recording: Recording) -> Iterable[dict[str, Any]]:
 
 
 def _row(element: str, shape: Shape, pose: FloatArray) -> dict[str, Any]:
-    corners = surfaces.corners_of(shape.outline)
+    corners = corners_of(shape.outline)
     size = (*shape.outline.size, 0.0, 0.0, 0.0)[:3]
     text = "" if corners is None else ";".join(" ".join(f"{v:.5g}" for v in c) for c in corners)
     return {
@@ -180,7 +185,7 @@ def _surface(row: Any, radius: float, middle: FloatArray) -> FloatArray:
     size = np.array([getattr(row, name) for name in SIZE], dtype=np.float64)
     if row.kind == "half_space":
         square = FLOOR * radius * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
-        found = surfaces.placed(square[[[0, 1, 2], [0, 2, 3]]], pose)
+        found = placed(square[[[0, 1, 2], [0, 2, 3]]], pose)
         normal = np.cross(found[0, 1] - found[0, 0], found[0, 2] - found[0, 0])
         normal /= np.sqrt((normal**2).sum())
         away = middle - pose[:3]
@@ -189,7 +194,7 @@ def _surface(row: Any, radius: float, middle: FloatArray) -> FloatArray:
         size[0] = max(LINE * radius, 1e-4 * size[1])
     text = row.corners if isinstance(row.corners, str) else ""
     corners = np.array([c.split() for c in text.split(";")], dtype=np.float64) if text else None
-    return surfaces.placed(surfaces.triangles_of(row.kind, size, corners), pose)
+    return placed(triangles_of(row.kind, size, corners), pose)
 
 
 def _room(table: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
@@ -234,13 +239,13 @@ def _panel(
         for row, triangles, colour, alpha in bodies:
             if row.kind == "half_space" and abs(row.qx) + abs(row.qy) < 1e-6:
                 continue  # a floor seen from above
-            seen = surfaces.outline_from_above(triangles)
+            seen = outline_from_above(triangles)
             axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.8)
     else:  # all surfaces in one collection, which sorts them by depth
         pad = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
-        view: dict[str, Any] = {"view": VIEW, "zoom": 1.05, "label_pads": (-7, -7, -7)}
-        axes = surfaces.space(figure, place, low, high, pad, unit, ticks=(3, 3), **view)
-        colours = np.concatenate([surfaces.shaded(*body[1:]) for body in bodies])
+        view: dict[str, Any] = {"view": VIEW, "zoom": 1.05, "ticks": (3, 3)}
+        axes = space(figure, place, low, high, pad, unit, **view)
+        colours = np.concatenate([shaded(*body[1:]) for body in bodies])
         triangles = np.concatenate([body[1] for body in bodies])
         surface = Poly3DCollection(triangles, facecolors=colours, linewidth=0)
         surface.set_rasterized(True)  # tens of thousands of triangles
@@ -254,4 +259,131 @@ def _panel(
     if len(targets):
         stars: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 7, "zorder": 10}
         axes.plot(*(targets[name] for name in columns), "*", linestyle="none", **stars)
+    return axes
+
+
+AROUND, ALONG = 14, 4  # pieces of a round surface around its axis, and of each of its ends
+MOST_CORNERS = 150  # of a mesh, which is drawn by the hull of the corners farthest out
+LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, length 1
+LABEL_PAD = -7.0  # [pt] from the numbers along an axis in space to its name
+NARROW = 0.6  # [-] of the longest side of a box, below which a side has few ticks
+PALE = (0.97, 0.97, 0.97, 1.0)  # behind shaded bodies
+DARKEST = 0.45  # [-] of a colour's brightness, where a surface is turned from the light
+
+
+def corners_of(outline: Outline) -> FloatArray | None:
+    """Return the corners (corners, 3) by which a mesh is drawn; None for another body.
+
+    Of a mesh of more than `MOST_CORNERS` those are taken that lie farthest out in as many
+    directions, evenly spread.
+    """
+    if outline.points is None:
+        return None
+    points = np.unique(outline.points, axis=0)
+    if len(points) <= MOST_CORNERS:
+        return points
+    k = np.arange(MOST_CORNERS) + 0.5
+    height, turn = 1.0 - 2.0 * k / MOST_CORNERS, np.pi * (1.0 + np.sqrt(5.0)) * k
+    wide = np.sqrt(1.0 - height**2)
+    directions = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), height])
+    return np.asarray(points[np.unique((points @ directions.T).argmax(axis=0))])
+
+
+def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> FloatArray:
+    """Return the triangles of a body of some size (3,) in its own frame, (triangles, 3, 3)."""
+    if kind == "mesh" and corners is not None:
+        return _hull(corners)
+    if kind == "box":
+        return _hull(0.5 * size * np.array(list(itertools.product((-1.0, 1.0), repeat=3))))
+    turn = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    rise = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * ALONG + 1)[:, None]
+    around = np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise) + 0.0 * turn
+    ball = np.stack(around, axis=-1).reshape(-1, 3)
+    if kind in ("sphere", "ellipsoid"):
+        return _hull(ball * (size if kind == "ellipsoid" else size[0]))
+    up = np.array([0.0, 0.0, 0.5 * float(size[1])])
+    if kind == "capsule":
+        return _hull(np.vstack([size[0] * ball - up, size[0] * ball + up]))
+    circle = size[0] * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(AROUND)])
+    return _hull(np.vstack([circle - up, circle * (kind == "cylinder") + up]))
+
+
+def capsule(start: FloatArray, end: FloatArray) -> tuple[pin.SE3, float]:
+    """Return pose and length of a capsule between two points (3,); of a sphere it is 0."""
+    along = np.asarray(end) - np.asarray(start)
+    length = float(np.sqrt((along**2).sum()))
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along) if length else None
+    middle = 0.5 * (np.asarray(start) + end)
+    return pin.SE3(np.eye(3) if turn is None else turn.matrix(), middle), length
+
+
+def placed(triangles: FloatArray, pose: FloatArray) -> FloatArray:
+    """Return triangles moved by a pose: position, quaternion x, y, z, w, (7,)."""
+    turned = Rotation.from_quat(pose[3:]).apply(triangles.reshape(-1, 3))
+    return np.asarray(turned + pose[:3]).reshape(triangles.shape)
+
+
+def shaded(triangles: FloatArray, colour: Any, alpha: float) -> FloatArray:
+    """Return the colours of triangles as the light falls on them, (triangles, 4)."""
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    lengths = np.sqrt((normals**2).sum(axis=1))
+    facing = (normals @ LIGHT) / np.where(lengths > 0.0, lengths, 1.0)
+    brightness = DARKEST + (1.0 - DARKEST) * 0.5 * (1.0 + facing)
+    rgb = np.array(to_rgb(colour))[None] * brightness[:, None]
+    return np.column_stack([np.clip(rgb, 0.0, 1.0), np.full(len(rgb), alpha)])
+
+
+def outline_from_above(triangles: FloatArray) -> FloatArray:
+    """Return the closed outline (points, 2) of a convex body as seen along z."""
+    points = triangles.reshape(-1, 3)[:, :2]
+    try:
+        around = points[ConvexHull(points).vertices]
+    except (QhullError, ValueError):  # it is seen as a line
+        spread = np.ptp(points, axis=0)
+        order = np.argsort(points[:, int(np.argmax(spread))], kind="stable")
+        around = points[order[[0, -1]]]
+    return np.vstack([around, around[:1]])
+
+
+def _hull(points: FloatArray) -> FloatArray:
+    """Return the hull's triangles, each counter-clockwise as seen from outside; none if flat."""
+    hull = hull_of(points)
+    if hull is None:
+        return np.empty((0, 3, 3))
+    corners, triangles = hull
+    return np.asarray(corners[triangles])
+
+
+def space(
+    figure: Figure,
+    place: tuple[Any, ...],
+    low: FloatArray,
+    high: FloatArray,
+    pad: FloatArray,
+    unit: str,
+    *,
+    view: tuple[float, float],
+    zoom: float,
+    ticks: tuple[int, int],
+) -> Any:
+    """Return axes in space with equal scales that hold a box (3,) and room beyond it (3,).
+
+    The view is elevation and azimuth [deg]; ticks are those of a narrow side and of a wide one, at
+    most.
+    """
+    axes: Any = figure.add_subplot(*place, projection="3d")
+    sides = high - low + 2.0 * pad
+    for name, least, greatest in zip("xyz", low - pad, high + pad, strict=True):
+        getattr(axes, f"set_{name}lim")(least, greatest)
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=LABEL_PAD, fontsize=7)
+    axes.set_box_aspect(sides, zoom=zoom)
+    axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
+    axes.tick_params(labelsize=6, pad=-2)
+    for axis, is_narrow in zip(
+        (axes.xaxis, axes.yaxis, axes.zaxis), sides < NARROW * sides.max(), strict=True
+    ):
+        axis.set_major_locator(MaxNLocator(nbins=ticks[0] if is_narrow else ticks[1]))
+        axis.set_pane_color(PALE)
+    axes.view_init(elev=view[0], azim=view[1])
     return axes

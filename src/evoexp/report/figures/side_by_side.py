@@ -33,7 +33,7 @@ def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataF
     for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
             columns = {"quantity": name, "position": position, "condition": c.label}
-            runs = {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}
+            runs = {"replicate": c.summaries.index, "value": values(c), "failed": len(c.failures)}
             parts.append(pd.DataFrame(columns | runs))
     return pd.concat(parts, ignore_index=True)
 
@@ -69,11 +69,8 @@ def draw_values(table: pd.DataFrame) -> Figure:
             axes.axvline(between, color=style.FAINT, linewidth=0.7, linestyle=(0, (1, 2)))
             place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "fontsize": 6.5}
             axes.annotate("never", (never, 1.0), ha="center", va="bottom", **place)
-    counts = (
-        table[table["quantity"] == quantities[0]]
-        .groupby("position")
-        .agg(n=("value", "size"), failed=("failed", "max"))
-    )
+    by_position = table[table["quantity"] == quantities[0]].groupby("position")
+    counts = by_position.agg(n=("value", "size"), failed=("failed", "max"))
     names = [
         f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})"
         for k, n, failed in counts.itertuples()
@@ -237,12 +234,9 @@ def specification_table(judged: Sequence[Any], headline: Any) -> pd.DataFrame:
             numbers: tuple[float, ...] = (*spread(headline.values(one.condition))[:3], np.nan)
             if size is not None:
                 name, numbers = size.name, (size.value, size.low, size.high, size.neutral)
-            reading, is_first = (
-                one.family.reading(one.condition),
-                one.condition is one.family.shipped,
-            )
-            family, verdict = one.family.shipped.label, one.claim.verdict
-            rows.append((family, reading, is_first, name, *numbers, verdict))
+            shipped, reading = one.family.shipped, one.family.reading(one.condition)
+            given = shipped.label, reading, one.condition is shipped, name
+            rows.append((*given, *numbers, one.claim.verdict))
     names = ["family", "reading", "default", "quantity", "value", "low", "high", "neutral"]
     return pd.DataFrame(rows, columns=[*names, "verdict"])
 

@@ -24,16 +24,10 @@ from evoexp.errors import SettingError, brief
 from evoexp.playback import colours
 
 ARM_COLOURS, arm_colour = colours.ARM_COLOURS, colours.arm_colour
-CONDITION_COLOURS = (
-    "#332288",
-    "#CC6677",
-    "#117733",
-    "#DDAA33",
-    "#88CCEE",
-    "#882255",
-    "#44AA99",
-    "#999933",
-)  # Tol
+CONDITION_COLOURS = (  # Tol
+    *("#332288", "#CC6677", "#117733", "#DDAA33"),
+    *("#88CCEE", "#882255", "#44AA99", "#999933"),
+)
 NUM_CURVE_COLOURS = 6  # that curves which cross are still told apart by
 CURVE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"

@@ -1,18 +1,29 @@
-"""Builds a report; no other module of it writes its files."""
+r"""Builds a report, with its tables as LaTeX; no other module of it writes its files.
+
+Tables are for `\input` in a paper of one column or two; they need `PACKAGES`. A table whose lines
+fit into one of two columns is a `table`. Any other one is a `table*` with broken lines, in parts if
+it has more columns or rows than a page has room for.
+"""
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+import yaml
+
 from evoexp.condition import Condition
+from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
 from evoexp.report.pages.html_page import HTML, html_page
 from evoexp.report.pages.index import document
-from evoexp.report.pages.latex_tables import latex_tables
 from evoexp.report.pages.page_builder import page_of
-from evoexp.report.pages.page_parts import Drawing, Page
+from evoexp.report.pages.page_parts import Document, Drawing, Page, Table
 from evoexp.report.pages.page_values import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
@@ -124,7 +135,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
                 "run": c.condition.id,
                 "planned": c.planned,
                 "done": c.done,
-                "failed": c.failed,
+                "failed": len(c.failures),
                 "run_code": c.code,
             }
             for c in drawing.conditions
@@ -143,3 +154,169 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     }
     text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
+
+
+PACKAGES = r"\usepackage{booktabs, array}"
+COLUMN, PAGE = 50, 104  # letters of \footnotesize on a line of one column, of both columns
+GAP = 1.2  # letters that the space between two columns of a table takes
+LINES = 50  # of \footnotesize on a page, beside the rules of a table
+ROW_GAP = 0.2  # lines of \footnotesize between two rows
+CAPTION = 70  # letters of a caption, as high as a line of \footnotesize
+LONGEST_WORD = 16  # letters; a longer word may be broken, behind a sign if it has one
+WIDE_SIGNS = "[A-Zmw−∞→≤≥≈]"  # they take half as much room again as others
+NUMBERS = "0123456789−–∞"  # signs that numbers begin with
+
+SIGNS: dict[str, str] = yaml.safe_load(
+    resources.files("evoexp").joinpath("assets/latex_signs.yaml").read_text(encoding="utf-8")
+)
+
+Cells = list[list[str]]
+
+
+def escaped(text: str) -> str:
+    """Return a text that LaTeX prints as it is; long words may be broken."""
+    quoted = re.sub('"([^"]*)"', r"“\1”", _tied(text))
+    words = []
+    for word in quoted.split(" "):
+        parts = ("".join(SIGNS.get(sign, sign) for sign in part) for part in _parts(word))
+        words.append(r"\allowbreak{}".join(parts))
+    return " ".join(words)
+
+
+def latex_tables(document: Document) -> dict[str, bytes]:
+    """Return the tables of a page, by the names of their files."""
+    tables = (*document.results, *document.appendix)
+    return {table.file: _latex(table, document).encode() for table in tables}
+
+
+def _latex(table: Table, document: Document) -> str:
+    cells = [
+        [_tied(str(getattr(value, "text", value)).replace("`", "")) for value in row]
+        for row in (table.headers, *table.rows)
+    ]
+    # heading, note, and whose runs these are
+    title = f"{document.title}: {table.heading}".replace("`", "")
+    caption = f"{title}. {table.note} {document.provenance}".replace("`", "")
+    words = f"{document.experiment or document.runs[0].hash12} {table.heading}"
+    label = f"tab:{'-'.join(re.findall('[a-z0-9]+', words.lower()))}"
+    lines = [
+        f"% made by {' '.join(document.command.split())}",
+        f"% runs: {', '.join(run.hash12 for run in document.runs)}",
+        f"% needs {PACKAGES}",
+    ]
+    floats = []
+    for columns in _columns(cells):
+        widths = _widths(columns)
+        begin, end = _frame(widths, columns)
+        floats += [(begin, rows, end) for rows in _pages(columns, widths, len(caption))]
+    for number, (begin, rows, end) in enumerate(floats, 1):
+        part = f" Part {number} of {len(floats)}." if len(floats) > 1 else ""
+        name = f"{label}-{number}" if number > 1 else label
+        header, *others = (" & ".join(map(escaped, row)) + r" \\" for row in rows)
+        lines += [
+            *begin[:2],
+            rf"\caption{{{escaped(caption + part)}}}",
+            rf"\label{{{name}}}",
+            begin[2],
+            *(r"\toprule", header, r"\midrule", *others, r"\bottomrule"),
+            *end,
+        ]
+        caption = f"{title}."
+    return "\n".join([*lines, ""])
+
+
+def _tied(text: str) -> str:
+    """Return a text on one line; no line ends before a % sign or a figure's number."""
+    text = re.sub(r"[^\S\u00a0]+", " ", text).strip(" ")
+    return re.sub(r" (?=%)|(?<=Fig\.) |(?<=Eq\.) ", "\u00a0", text)
+
+
+def _parts(word: str) -> list[str]:
+    if len(word) <= LONGEST_WORD:
+        return [word]
+    return re.findall(rf".{{1,{LONGEST_WORD - 1}}}[._/=:,]|.{{1,{LONGEST_WORD}}}", word)
+
+
+def _room(text: str) -> float:
+    return len(text) + len(re.findall(WIDE_SIGNS, text)) / 2
+
+
+def _narrowest(cells: Cells) -> FloatArray:
+    """Return the least widths of columns, in letters: those of their longest words."""
+    return np.array(
+        [
+            GAP
+            + max(
+                _room(part) for cell in column for word in cell.split(" ") for part in _parts(word)
+            )
+            for column in zip(*cells, strict=True)
+        ]
+    )
+
+
+def _columns(cells: Cells) -> Iterator[Cells]:
+    """Yield tables of as many columns as there is room for; each has the first column."""
+    narrowest = _narrowest(cells)
+    taken = [0]
+    for k in range(1, len(narrowest)):
+        if narrowest[[*taken, k]].sum() > PAGE:
+            yield [[row[j] for j in taken] for row in cells]
+            taken = [0]
+        taken.append(k)
+    yield [[row[j] for j in taken] for row in cells]
+
+
+def _widths(cells: Cells) -> FloatArray:
+    """Return the widths of columns in letters, by which rows have few lines."""
+    room = np.array([[_room(cell) for cell in row] for row in cells])
+    room[0] /= 2.0  # headers may have two lines
+    widths = _narrowest(cells)
+    whole: FloatArray = np.maximum(room.max(axis=0) + GAP, widths)
+    if whole.sum() <= COLUMN:
+        return whole
+    # letter by letter to the column that most lines wait for
+    steps = np.eye(len(widths))
+    while widths.sum() < PAGE - 1:
+        lines = np.maximum(room / (widths + steps - GAP)[:, None], 1.0).max(axis=2).sum(axis=1)
+        widths += steps[lines.argmin()]
+    return widths
+
+
+def _pages(cells: Cells, widths: FloatArray, caption: int) -> Iterator[Cells]:
+    """Yield header and rows for each page, below a caption of so many letters."""
+    heights = [
+        ROW_GAP
+        + max(
+            len(textwrap.wrap(cell, round(1.15 * (width - GAP))))
+            for cell, width in zip(row, widths, strict=True)
+        )
+        for row in cells
+    ]
+    above = heights[0] + caption / CAPTION * (PAGE / COLUMN if widths.sum() <= COLUMN else 1.0)
+    rows, height = cells[:1], above
+    for row, own in zip(cells[1:], heights[1:], strict=True):
+        if height + own > LINES and len(rows) > 1:
+            yield rows
+            rows, height = cells[:1], above
+        rows, height = [*rows, row], height + own
+    yield rows
+
+
+def _frame(widths: FloatArray, cells: Cells) -> tuple[list[str], list[str]]:
+    """Return the lines that begin and end a table: `table*` if it is wider than a column."""
+    is_narrow = widths.sum() <= COLUMN
+    name, shares = ("table", widths / COLUMN) if is_narrow else ("table*", widths / widths.sum())
+    # numbers stand to the right
+    columns = []
+    for k, (_, *column) in enumerate(zip(*cells, strict=True)):
+        is_number = k and all(cell[:1] in NUMBERS for cell in column if cell)
+        side = "left" if is_number else "right"
+        width = rf"p{{\dimexpr {shares[k] - 5e-5:.4f}\linewidth-2\tabcolsep\relax}}"
+        columns.append(rf">{{\ragged{side}\arraybackslash\hspace{{0pt}}}}{width}")
+    begin = [
+        rf"\begin{{{name}}}",
+        r"\setlength{\belowcaptionskip}{4pt}\setlength{\tabcolsep}{2pt}"
+        r"\setlength{\extrarowheight}{2pt}\centering\footnotesize",
+        rf"\begin{{tabular}}{{{''.join(columns)}}}",
+    ]
+    return begin, [r"\end{tabular}", rf"\end{{{name}}}"]

@@ -12,16 +12,16 @@ import pandas as pd
 
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
-from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
+from evoexp.report.figures import effort_curves
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.comparison_files import GivenData, shipped_best_known
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
-from evoexp.report.results.run_measures import search_seconds
+from evoexp.report.results.run_measures import counted, search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics import inference, problem_ranks
+from evoexp.report.statistics import inference
 from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
 
 CSV_COLUMNS = [
@@ -76,7 +76,7 @@ def page(
     return own_page("comparison", results, settings, runs=runs, given=given)
 
 
-ranks = problem_ranks.standing
+ranks = effort_curves.standing
 compared_conditions = stored_conditions
 
 
@@ -186,19 +186,18 @@ def compared_lengths(
     return (("best proven length", tuple(adjusted(rows))),) if rows else ()
 
 
-def rank_rows(ranks: problem_ranks.Standing) -> list[tuple[str, ...]]:
+def rank_rows(ranks: effort_curves.Standing) -> list[tuple[str, ...]]:
     """Return mean ranks, best first; none where there is but one planner, or one problem."""
     if not ranks.can_be_profiled:
         return []
     lengths = ranks.lengths
     best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
+    having = best, np.isfinite(lengths), np.isfinite(ranks.efforts)
     return [
         (
             planner,
             f"{ranks.mean_ranks[k]:.2f}",
-            markdown.share(int(best[:, k].sum()), len(lengths)),
-            markdown.share(int(np.isfinite(lengths[:, k]).sum()), len(lengths)),
-            markdown.share(int(np.isfinite(ranks.efforts[:, k]).sum()), len(lengths)),
+            *(str(counted(holds[:, k])) for holds in having),
         )
         for k, planner in sorted(
             enumerate(ranks.planners), key=lambda each: ranks.mean_ranks[each[0]]
@@ -228,22 +227,23 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "ranked_conditions": lambda runs, ranks: stored_conditions(
         own for own in runs if own.problem.name in ranks.problems
     ),
-    "num_problems": lambda runs: len(problem_order(runs)),
+    "num_problems": lambda runs: len(effort_curves.problem_order(runs)),
     "one_problem": lambda num_problems: num_problems == 1,
-    "hidden_problems": lambda num_problems: num_problems > MAX_PANELS,  # without a panel
+    # some problems have no panel
+    "hidden_problems": lambda num_problems: num_problems > effort_curves.MAX_PANELS,
     # planners were run on different problems
     "unequal": lambda runs: (
         len({frozenset(b.problem.name for b in runs if b.planner == a.planner) for a in runs}) > 1
     ),
     "left_out": lambda ranks: ", ".join(ranks.left_out),
     "outsiders": lambda ranks: ", ".join(ranks.outsiders),
-    "friedman_test": lambda ranks: problem_ranks.friedman(ranks.lengths),
+    "friedman_test": lambda ranks: effort_curves.friedman(ranks.lengths),
     "ranks_differ": lambda ranks, settings: (
         ranks.can_be_tested
-        and problem_ranks.friedman(ranks.lengths).p_value < settings.significance
+        and effort_curves.friedman(ranks.lengths).p_value < settings.significance
     ),
     "ranks_are_alike": lambda ranks, ranks_differ: ranks.can_be_tested and not ranks_differ,
-    "nemenyi": lambda ranks, settings: problem_ranks.critical_difference(
+    "nemenyi": lambda ranks, settings: effort_curves.critical_difference(
         len(ranks.planners), len(ranks.problems), settings.significance
     ),
     # problems that no planner has a proven answer on

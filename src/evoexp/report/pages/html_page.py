@@ -53,12 +53,13 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
     claims = [(text, cell) for text, cell in cells if isinstance(cell, Verdict)]
     sentences = [(text, verdict.text) for text, verdict in claims if not verdict.is_ours]
     questions = [(text, verdict.text) for text, verdict in claims if verdict.is_ours]
-    introduction = _SENTENCE.split(document.introduction)
+    told = _SENTENCE.split(document.introduction)
+    introduction = told[:FEW_SENTENCES], told[FEW_SENTENCES:]
     summary = {  # that the page carries for the home page
         "title": document.title,
         "command": document.command.removeprefix("evoexp "),
         "partial": dict(document.notices).get("Partial results", ""),
-        "failed": sum(run.failed for run in document.runs),
+        "failed": sum(len(run.failures) for run in document.runs),
         "headings": [*headings, *((each["figure"].title, each["anchor"]) for each in figures)],
         "claims": sentences,
         "questions": questions,
@@ -70,10 +71,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
         {run.hash12: run.label for run in document.runs},
         document=document,
         sections=sections,
-        introduction=[
-            " ".join(introduction[:FEW_SENTENCES]),
-            " ".join(introduction[FEW_SENTENCES:]),
-        ],
+        introduction=[" ".join(part) for part in introduction],
         tallies=tallies(sentences, questions),
         claims_heading=CLAIMS,
         few_claims=FEW_CLAIMS,
@@ -152,20 +150,17 @@ def written(template: str, runs: Mapping[str, str] | None = None, **values: Any)
             return inline(str(text), known)
         return Markup('<a href="#run-{}">{}</a>').format(name, inline(str(text)))
 
-    text = (
-        environment()
-        .get_template(template)
-        .render(
-            inline=lambda value: inline(str(value), known),
-            label=label,
-            few_columns=FEW_COLUMNS,
-            is_verdict=lambda value: isinstance(value, Verdict),
-            verdict_class=verdict_class,
-            number_columns=number_columns,
-            style=Markup(asset("site.css")),
-            script=Markup(asset("site.js")),
-            **values,
-        )
+    page = environment().get_template(template)
+    text = page.render(
+        inline=lambda value: inline(str(value), known),
+        label=label,
+        few_columns=FEW_COLUMNS,
+        is_verdict=lambda value: isinstance(value, Verdict),
+        verdict_class=verdict_class,
+        number_columns=number_columns,
+        style=Markup(asset("site.css")),
+        script=Markup(asset("site.js")),
+        **values,
     )
     return text.lstrip("\n").encode()
 

@@ -69,7 +69,6 @@ def document(
 
 
 def _verdict(claim: Claim) -> Verdict:
-    """Return a claim's verdict with the number that decides it, or with how many were counted."""
     number = f"n = {claim.n}" if claim.n not in ("", "–") else ""
     if claim.size is not None:
         number = f"{claim.size.name} {claim.size.value:.3g}"
@@ -126,7 +125,8 @@ def _notices(results: Results) -> Iterator[tuple[str, str]]:
     missing, lost, added = list[str](), list[str](), list[str]()
     for c in results.conditions:
         if c.done < c.planned:
-            missing.append(f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed")
+            done = f"{c.done} of {c.planned} replicates done"
+            missing.append(f"{c.label}: {done}, {len(c.failures)} failed")
         if c.damaged:
             names = [*list(c.damaged)[:FEW], *["…"] * (len(c.damaged) > FEW)]
             lost.append(f"{c.label}: {len(c.damaged)} ({', '.join(names)})")
@@ -163,13 +163,13 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
     for c in results.conditions:
         solved, found = "–", c.verdicts
         if c.done:
-            interval = Proportion(c.solved, c.done).interval(settings.confidence)
-            solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
+            share = Proportion(c.solved, c.done)
+            solved = f"{share} ({markdown.percent(share.interval(settings.confidence))})"
         exact: tuple[object, ...] = ("–",) * 5
         if found.judged:
             proven = found.certified, found.refuted, found.undecided
             exact = (*proven, found.solved_refuted, found.margin_broken)
-        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, c.failed, solved, *exact))
+        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, len(c.failures), solved, *exact))
     return _table("conditions", rows, level=100 * settings.confidence)
 
 

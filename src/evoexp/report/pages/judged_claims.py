@@ -68,7 +68,6 @@ def judged_as_written(scopes: Iterable[Scope], entry: Mapping[str, Any]) -> Iter
 
 
 def _items(scope: Scope, entry: Mapping[str, Any]) -> Iterator[_Item]:
-    """Yield the item of a scope, if its conditions are there."""
     by_label = {c.label: c for c in scope["conditions"]}
     than = entry.get("than", [])
     labels = [entry["of"]] if "of" in entry else ["{condition.label}"] * ("condition" in scope)
@@ -185,7 +184,6 @@ def _alone(item: _Item, entry: Mapping[str, Any]) -> Claim:
 
 
 def _share(holds: Any) -> Proportion:
-    """Return a share as it is, or count the runs in which something holds, (done,) of truth."""
     return holds if isinstance(holds, Proportion) else counted(holds)
 
 

@@ -120,11 +120,6 @@ def p_value(p: float) -> str:
     return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}".replace("-", "−")
 
 
-def share(count: int, total: int) -> str:
-    """Return a count of a total."""
-    return f"{count} of {total}"
-
-
 def percent(interval: Interval) -> str:
     """Return an interval of a proportion in percent."""
     return f"{100 * interval.low:.0f}–{100 * interval.high:.0f} %"

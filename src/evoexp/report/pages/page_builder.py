@@ -4,21 +4,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, cast
 
-from evoexp.report.pages import GENERIC, page_registration, swept
+from evoexp.report.pages import page_parts, swept
 from evoexp.report.pages.judged_claims import Headline, judged_as_written
 from evoexp.report.pages.page_file import PageFile, Scope, own_pages, read_page_file
-from evoexp.report.pages.page_parts import (
-    Claim,
-    Drawing,
-    Page,
-    PlayedRun,
-    Quantity,
-    Table,
-    quantity,
-)
+from evoexp.report.pages.page_parts import Claim, Drawing, Page, Quantity, Table, quantity
 from evoexp.report.pages.page_values import best_motions
 from evoexp.report.pages.swept import sweep_of
-from evoexp.report.report_settings import ReportSettings
+from evoexp.report.report_settings import GENERIC, ReportSettings, page_registration
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import comparisons
 from evoexp.report.statistics.judging import left_out
@@ -172,10 +164,7 @@ class PageBuilder:
                 pairs = [(by_label[one], by_label[two]) for one, two in known]
                 for row in each["measures"] if pairs else ():
                     of = measure(self.scope, *row)
-                    lower, named = of.lower_is_better, "{0.label} against {1.label}".format
-                    rows = comparisons.compared(
-                        pairs, of.values, settings, lower_is_better=lower, named=named
-                    )
+                    rows = of.compared(pairs, settings, named=comparisons.AGAINST)
                     yield f"{of.name}: {each['heading']}", rows
         for one in self.scope["compared"]:
             if one.rows:
@@ -253,7 +242,7 @@ class PageBuilder:
             draw=partial(draw, **entry["options"]) if "options" in entry else draw,
             conditions=tuple(conditions),
             plays=tuple(
-                PlayedRun(one.condition, one.replicate)
+                page_parts.PlayedRun(one.condition, one.replicate)
                 for one in played
                 if one.replicate is not None
             ),

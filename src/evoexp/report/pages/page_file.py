@@ -22,7 +22,8 @@ from typing import Any, NamedTuple, get_origin
 import yaml
 
 from evoexp.errors import SettingError, UnknownSetting, nearest
-from evoexp.report.pages import GENERIC, markdown, page_values
+from evoexp.report.pages import markdown, page_values
+from evoexp.report.report_settings import GENERIC
 from evoexp.report.results import run_measures
 from evoexp.report.statistics.judging import NO_RULES, Rules, read_rules
 from evoexp.store.log import TERM

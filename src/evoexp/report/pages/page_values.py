@@ -49,9 +49,8 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "several": lambda results: len(results.with_data) > 1,  # there is something to compare
     "are_few": lambda results: len(results.evolved) <= FEW,
-    "whole": lambda conditions: (
-        comparisons.Family.of(conditions),
-    ),  # the first one against all others
+    # the first one against all others
+    "whole": lambda conditions: [comparisons.Family.of(conditions)],
     "played": lambda condition: (PlayedRun(condition, condition.best_replicate),),
     "judge": lambda results, settings, rules: judging.judge(results, settings, rules),
     "confidence": lambda settings: settings.confidence,  # of every interval, in (0, 1)
@@ -124,11 +123,12 @@ def pairs_of_conditions(
     of = "pairs of conditions"
     if len(results.evolved) > MOST_PAIRED:
         of = f"{results.evolved[0].label} against each other condition"
-    found = (
-        (f"{name}: {of}", comparisons.compared(_pairs(results), values, settings, named=_named))
+    pairs, named = _pairs(results), comparisons.AGAINST
+    found = {
+        f"{name}: {of}": comparisons.compared(pairs, values, settings, named=named)
         for name, values in differing.items()
-    )
-    return tuple((heading, rows) for heading, rows in found if rows)
+    }
+    return tuple((heading, rows) for heading, rows in found.items() if rows)
 
 
 def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ...]]:
@@ -152,12 +152,8 @@ def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]
             difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
             points = f"{difference} [{low}, {high}]".replace("-", "−")
             tests = markdown.p_value(p), markdown.p_value(adjusted)
-            rows.append((name, _named(a, b), points, *tests))
+            rows.append((name, comparisons.AGAINST(a, b), points, *tests))
     return rows
-
-
-def _named(first: ConditionResults, second: ConditionResults) -> str:
-    return f"{first.label} against {second.label}"
 
 
 JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`

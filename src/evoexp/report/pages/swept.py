@@ -144,7 +144,7 @@ MEASURES: dict[str, Values] = {  # that pages of sweeps tell, by name
 def best_condition(sweep: Sweep, results: Results) -> Results:
     """Return the results of the condition of the least median cost alone."""
     with_data = (each.results for each in sweep.conditions if each.results.done)
-    best = sorted(with_data, key=lambda c: c.spread("best_cost").median)[:1]
+    best = sorted(with_data, key=lambda c: inference.quantile(c.column("best_cost"), 0.5))[:1]
     return results._replace(conditions=tuple(best))
 
 

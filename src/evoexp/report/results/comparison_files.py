@@ -173,7 +173,6 @@ def strange_problems(data: GivenData, ours: Sequence[PlannerRuns]) -> Iterator[s
 
 
 def _known(ours: Sequence[PlannerRuns]) -> dict[str, Problem]:
-    """Return our problems by each name that a file may call them."""
     known = {own.problem.name: own.problem for own in ours}
     for own in ours:
         known.setdefault(own.label, own.problem)

@@ -311,16 +311,14 @@ def planner_names(
     unique = len(every) == len(conditions) and len(kinds) == num_names
     if unique and all(rest.values()) and num_names < len(conditions):
         return rest
-    planners: dict[str, list[Any]] = {}  # component → its settings
-    for c in conditions:
-        same = planners.setdefault(c.condition.planner.component, [])
-        if c.condition.planner not in same:
-            same.append(c.condition.planner)
+    alike = grouped(conditions, lambda c: c.condition.planner)
+    different = [own[0].condition.planner for own in alike]
     names = {}
     for c in conditions:
-        same = planners[c.condition.planner.component]
-        number = f" {same.index(c.condition.planner) + 1}" if len(same) > 1 else ""
-        names[c.label] = f"{c.condition.planner.component}{number}"
+        planner = c.condition.planner
+        same = [other for other in different if other.component == planner.component]
+        number = f" {same.index(planner) + 1}" if len(same) > 1 else ""
+        names[c.label] = f"{planner.component}{number}"
     return names
 
 

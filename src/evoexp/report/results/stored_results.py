@@ -17,7 +17,6 @@ from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import WrappedPlanner
 from evoexp.records import FloatArray
-from evoexp.report.statistics.inference import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
@@ -74,12 +73,13 @@ class ConditionResults:
     @functools.cached_property
     def generations(self) -> pd.DataFrame:
         """One row per generation of every finished replicate."""
-        return read_generations(self.run, self._finished)
+        return read_generations(self.run, self.summaries.index.tolist())
 
     @functools.cached_property
     def solutions(self) -> dict[int, FloatArray]:
         """Replicate → its best solution, flat."""
-        return {k: read_solution(self.run.log_path(k)).values for k in self._finished}
+        logs = {int(k): self.run.log_path(int(k)) for k in self.summaries.index}
+        return {k: read_solution(path).values for k, path in logs.items()}
 
     def first_solution(self, replicate: int) -> FloatArray:
         """Return the best of the initial population of a replicate."""
@@ -90,10 +90,6 @@ class ConditionResults:
         return read_log(self.run.log_path(self.best_replicate)).arrays()[name]
 
     @property
-    def _finished(self) -> list[int]:
-        return [int(replicate) for replicate in self.summaries.index]
-
-    @property
     def hash12(self) -> str:
         """The twelve hex digits that name the run."""
         return self.condition.id[:12]
@@ -102,11 +98,6 @@ class ConditionResults:
     def done(self) -> int:
         """Number of finished replicates."""
         return len(self.summaries)
-
-    @property
-    def failed(self) -> int:
-        """Number of failed replicates."""
-        return len(self.failures)
 
     def added(self, fixed: int) -> int:
         """Return how many finished replicates were asked for when results were there already."""
@@ -198,10 +189,6 @@ class ConditionResults:
             return np.full(self.done, np.nan)
         return self.summaries[name].to_numpy(dtype=np.float64, na_value=np.nan)
 
-    def spread(self, name: str) -> Spread:
-        """Return median and quartiles of a column of the summaries."""
-        return spread(self.column(name))
-
 
 class Results(NamedTuple):
     """Everything that a report is drawn from."""
@@ -276,10 +263,9 @@ def gather(
         _read(outputs, label, condition, num_replicates, (options or {}).get(label))
         for label, condition in conditions
     )
-    if not any(condition.done or condition.failed for condition in found):
-        raise NothingStored(
-            f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}"
-        )
+    if not any(condition.done or condition.failures for condition in found):
+        told = f"nothing stored in {outputs}; try: {command}"
+        raise NothingStored(f"{experiment or 'report'}: {told}")
     return Results(experiment, budget, found, outputs)
 
 

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from evoexp.report.statistics.inference import Effect, effect, holm, quantile, r
 
 Values = Callable[[ConditionResults], FloatArray]
 Pair = tuple[ConditionResults, ConditionResults]
+
+
+AGAINST = "{0.label} against {1.label}".format  # the name of a pair
 
 
 class Comparison(NamedTuple):
@@ -49,9 +52,12 @@ class Measure(NamedTuple):
     unit: str = "–"
     lower_is_better: bool = True
 
-    def compared(self, pairs: Iterable[Pair], settings: ReportSettings) -> tuple[Comparison, ...]:
-        """Compare pairs of conditions in this quantity."""
-        return compared(pairs, self.values, settings, lower_is_better=self.lower_is_better)
+    def compared(
+        self, pairs: Iterable[Pair], settings: ReportSettings, **named: Any
+    ) -> tuple[Comparison, ...]:
+        """Compare pairs of conditions in this quantity, see `compared`."""
+        lower = self.lower_is_better
+        return compared(pairs, self.values, settings, lower_is_better=lower, **named)
 
 
 class Family(NamedTuple):
@@ -130,7 +136,7 @@ def compared_with_controls(
                 for row in each.compared([(first, second)], settings)
             ]
             if rows:
-                yield f"{first.label} against {second.label}", tuple(adjusted(rows))
+                yield AGAINST(first, second), tuple(adjusted(rows))
 
 
 def beside(first: Condition, control: Condition) -> bool:

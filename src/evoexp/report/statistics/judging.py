@@ -19,8 +19,8 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import option, planned_replicates
-from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, Values, compared
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import Comparison
 from evoexp.report.statistics.inference import Proportion, fisher_exact, newcombe, runs_for_shares
 from evoexp.shipped import config_directory, shipped
 
@@ -148,12 +148,10 @@ class Hearing(NamedTuple):
         """
         says = row.says(self.significance) if row else 0
         words = evidence(row, word) if row else "nothing to compare"
-        heard = self._replace(
-            rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
-        )
+        rule = self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         counted, would_do = row and row.num_runs, row and row.runs_to_decide(self.significance)
         judged = counted, says == 1, says == -1, _least_effect([row] if row else []), would_do
-        return heard._claim("better", told.replace("{}", words), *judged)
+        return self._replace(rule=rule)._claim("better", told.replace("{}", words), *judged)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
         """Judge a claim that a condition is better than each of several others."""
@@ -277,12 +275,6 @@ class Judge(NamedTuple):
     def level(self) -> float:
         """The level of every interval."""
         return self.settings.confidence
-
-    def compared(
-        self, first: ConditionResults, second: ConditionResults, values: Values
-    ) -> Comparison | None:
-        """Compare two conditions in a quantity, lower is better; None: one has no run."""
-        return next(iter(compared([(first, second)], values, self.settings)), None)
 
     def share(self, proportion: Proportion, decimals: int = 0) -> str:
         """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""

@@ -11,15 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from evoexp.papers.chen import path_claims
-from evoexp.papers.chen.path_claims import (
-    DISTANCE,
-    UNSAFENESS,
-    Group,
-    Routes,
-    above_known,
-    median_path,
-    paths,
-)
+from evoexp.papers.chen.path_claims import Group, Routes, above_known, cost_known, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
@@ -57,7 +49,7 @@ Panel = tuple[str, ConditionResults, list[Line]]
 def known_lines(group: Group) -> list[Line]:
     """Return the run of median cost, and the best path that the reference knows."""
     best = (Line(EXACT, path) for path in group.best_path)
-    return [Line(MEDIAN, median_path(group.main)), *best]
+    return [Line(MEDIAN, path_claims.median_path(group.main)), *best]
 
 
 def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
@@ -70,9 +62,8 @@ def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
         for number, line in enumerate(lines):
             same = (*head, line.kind, line.text, number, line.share)
             rows += [(*same, x, y) for x, y in line.path.tolist()]
-    return pd.DataFrame(
-        rows, columns=["panel", "unit", "kind", "text", "number", "share", "x", "y"]
-    )
+    names = ["panel", "unit", "kind", "text", "number", "share", "x", "y"]
+    return pd.DataFrame(rows, columns=names)
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
@@ -154,9 +145,8 @@ def draw_places(table: pd.DataFrame) -> Figure:
         label = f"{rows['condition'].iloc[0]} (n = {rows['runs'].iloc[0]})"
         axes.bar(x, own, width=width, color=style.condition_colour(int(position)), label=label)
     axes.set_xticks(np.arange(len(values)), [f"{value:g}" for value in values])
-    axes.set(
-        xlabel="unsafeness Sᵢ of a node (1: far from everything)", ylabel="nodes per path, mean"
-    )
+    axes.set_xlabel("unsafeness Sᵢ of a node (1: far from everything)")
+    axes.set_ylabel("nodes per path, mean")
     axes.grid(visible=False, axis="x")
     style.legend_below(figure, [axes], min(count, 4))
     return figure
@@ -176,7 +166,7 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
                     given = group.title, position, _name(c, group), name, generation
                     rows.append((*given, median, lower, upper))
         if group.truth is not None:
-            known = (KNOWN, group.optimum), (BOUND, group.bound)
+            known = (KNOWN, cost_known(group.truth)), (BOUND, path_claims.bound_known(group.truth))
             rows += [(group.title, -1, name, name, 0, *(value,) * 3) for name, value in known]
     names = ["panel", "position", "condition", "quantity", "generation"]
     return pd.DataFrame(rows, columns=[*names, "median", "lower", "upper"])
@@ -206,19 +196,15 @@ def draw_costs(table: pd.DataFrame) -> Figure:
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
     """Return every run's gap to the best path known."""
-    parts = []
-    for group in found:
-        for position, c in enumerate(group.conditions):
-            columns: dict[str, Any] = {
-                "panel": group.title,
-                "position": position,
-                "condition": _name(c, group),
-            }
-            columns |= {"replicate": c.summaries.index}
-            columns |= {"gap_percent": above_known(c, group.optimum)}
-            columns |= {"bound_percent": 100.0 * (group.bound / group.optimum - 1.0)}
-            parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True)
+    rows = [
+        (group.title, position, _name(c, group), replicate, gap, 100.0 * (bound / known - 1.0))
+        for group in found
+        for known, bound in ((cost_known(group.truth), path_claims.bound_known(group.truth)),)
+        for position, c in enumerate(group.conditions)
+        for replicate, gap in zip(c.summaries.index, above_known(c, known), strict=True)
+    ]
+    names = ["panel", "position", "condition", "replicate", "gap_percent", "bound_percent"]
+    return pd.DataFrame(rows, columns=names)
 
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
@@ -245,12 +231,12 @@ def _name(condition: ConditionResults, group: Group) -> str:
 
 def gaps_of_runs(condition: ConditionResults, group: Group, confidence: float) -> str:
     """Describe the gaps of a condition's runs above the best path known."""
-    gaps, shares = above_known(condition, group.optimum), []
+    gaps, shares = above_known(condition, cost_known(group.truth)), []
     for bound in (0, 1, 5):  # [%]
         found = counted(gaps <= bound + 1e-9)
         interval = markdown.percent(found.interval(confidence))
         name = f"within {bound} %" if bound else "equal or better"
-        shares.append(f"{name} {markdown.share(*found)} ({interval})")
+        shares.append(f"{name} {found} ({interval})")
     return f"median {np.median(gaps):+.1f} %, {', '.join(shares)}".replace("-", "−")
 
 
@@ -267,9 +253,9 @@ def same_problems(groups: tuple[Group, ...]) -> Iterator[tuple[object, ...]]:
                 {tuple(node) for node in group.best_path[0].tolist()} for group in (one, two)
             )
             # the cost of the best path of one by the weights of two
-            terms = (one.truth.column(name)[0] for name in (DISTANCE, UNSAFENESS))
+            terms = (one.truth.column(name)[0] for name in path_claims.TERMS)
             cost = sum(weight * term for weight, term in zip(two.weights, terms, strict=True))
-            exchanged = float(cost) / two.optimum - 1.0
+            exchanged = float(cost) / cost_known(two.truth) - 1.0
             nodes = len(own), len(other)
             yield one, two, ratios, len(own & other), nodes, 100.0 * exchanged
 
@@ -280,7 +266,7 @@ def route_panels(groups: tuple[Group, ...], route_list: Routes) -> list[Panel]:
     for group in groups:
         c, lines = group.main, list[Line]()
         for name, members in path_claims.routes_of(c, route_list).items():
-            path, count = median_path(c, members), len(members)
+            path, count = path_claims.median_path(c, members), len(members)
             lines.append(Line(name, path, count / c.done, f"{name}: {count} of {c.done}"))
         panels.append((group.title, c, lines))
     return panels
@@ -291,7 +277,7 @@ def lingering(group: Group, groups: tuple[Group, ...]) -> str:
     repeats = [_repeated(path) for path in paths(group.main).values()]
     simple = [g for g in groups if g.weights == group.weights and not g.revisits][:1]
     return (
-        f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
+        f"{counted(repeats)} runs pass nodes "
         f"again, median {np.median(repeats):.0f} repeated nodes; median length "
         f"{_length(group):.0f} cells"
     ) + "".join(f", {_length(g):.0f} without revisits" for g in simple)
@@ -305,9 +291,10 @@ def best_known(group: Group) -> dict[str, object]:
         float(group.truth.column(f"term_{name}")[0])
         for name in ("distance", "unsafeness", "bound_is_reached")
     )
-    told, gap = f"no path is below {group.bound:.5g}", 100.0 * (group.optimum / group.bound - 1.0)
-    within = f"no path costs less than {group.bound:.5g}: the truth is known within {gap:.1f} %"
-    words: dict[str, object] = {"length": length, "unsafeness": unsafeness}
+    cost, bound = cost_known(group.truth), path_claims.bound_known(group.truth)
+    told, gap = f"no path is below {bound:.5g}", 100.0 * (cost / bound - 1.0)
+    within = f"no path costs less than {bound:.5g}: the truth is known within {gap:.1f} %"
+    words: dict[str, object] = {"cost": cost, "length": length, "unsafeness": unsafeness}
     words |= {"nodes": len(best), "repeated": _repeated(best), "told": told, "within": within}
     return words | ({"told": "exact", "within": "exact"} if exact else {})
 
@@ -333,12 +320,9 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     # the paths of all runs of every weighting, faint, and those that stand out
     "path_panels": lambda groups: [
-        (
-            g.title,
-            g.main,
-            [*(Line(FAINT, each) for each in paths(g.main).values()), *known_lines(g)],
-        )
+        (g.title, g.main, [*faint, *known_lines(g)])
         for g in groups
+        for faint in ([Line(FAINT, each) for each in paths(g.main).values()],)
     ],
     # the first condition of each weighting against its others
     "group_families": lambda groups: [Family.of(group.conditions) for group in groups],

@@ -109,7 +109,6 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
 
 
 def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> None:
-    """Draw one line with intervals per task, side by side."""
     marks.dashed(axes, marked)
     share = table["kind"].iloc[0] == SHARE
     scale = 100.0 if share else 1.0
@@ -145,7 +144,6 @@ def _look(position: int) -> dict[str, Any]:
 
 
 def _keys(table: pd.DataFrame) -> list[Line2D]:
-    """Return an entry of the legend per task."""
     tasks = sorted(set(zip(table["position"], table["task"], strict=True)))
     return [style.key(name, **_look(position)) for position, name in tasks]
 

@@ -119,13 +119,11 @@ def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> li
 
 
 def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any]:
-    """Return a row with a place, or with the two ends of a link."""
     row = {"element": element, "instant": instant, "name": name}
     return row | dict(zip([*PLACE, *PATH], places, strict=False))
 
 
 def _points(rows: pd.DataFrame) -> FloatArray:
-    """Return points that a panel has to hold."""
     links, goal, *solid = (rows[rows["element"] == e] for e in (LINK, GOAL, OBSTACLE, HELD))
     return np.vstack([links[PLACE], links[PATH], goal[PLACE], *map(solids.corners, solid)])
 
@@ -166,9 +164,8 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
         for element, points, *rest in parts
         for n, (x, y) in enumerate(points)
     ]
-    table = rounded(
-        pd.DataFrame(rows, columns=["element", "order", "x", "y", "half_x", "half_y", "factor"])
-    )
+    names = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
+    table = rounded(pd.DataFrame(rows, columns=names))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.length_unit)
 
 
@@ -302,9 +299,21 @@ def draw_trap(table: pd.DataFrame) -> Figure:
         xlabel="posture of the path", ylabel=f"distance to the goal [{unit}]", ylim=(0.0, None)
     )
     along.set_title("b  distance along the paths")
-    _draw_landscape(figure, land, cells)
+    # the cost around the posture that is stuck, and its scope
+    wide = cells.pivot(index="y", columns="x", values="value")
+    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
+    shown = land.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
+    figure.colorbar(shown, ax=land, label="cost [-]", shrink=0.9)
+    x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
+    marks.contact(land, x, y, 8)
+    frame: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
+    land.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **frame))
+    land.grid(visible=False)
+    first, second = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
+    title = "c  cost around a stuck posture (×), its scope"
+    land.set(xlabel=first, ylabel=second, title=title, facecolor="#c8c8c8")
     # the least cost in boxes around the posture that is stuck
-    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    look = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
     escape.axhline(escapes["y"].iloc[0], label="stuck", **look)
     escape.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     escape.set_xscale("log", base=2)
@@ -314,18 +323,3 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
     style.keys_below(figure, keys)
     return figure
-
-
-def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
-    wide = cells.pivot(index="y", columns="x", values="value")
-    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
-    shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
-    figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
-    x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
-    marks.contact(axes, x, y, 8)
-    frame: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
-    axes.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **frame))
-    axes.grid(visible=False)
-    first, second = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
-    title = "c  cost around a stuck posture (×), its scope"
-    axes.set(xlabel=first, ylabel=second, title=title, facecolor="#c8c8c8")

@@ -14,7 +14,7 @@ from evoexp.papers import trails
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.playback.recording import outline
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, records, rounded, style, surfaces
+from evoexp.report.figures import groups, motion_scenes, records, rounded, style
 from evoexp.report.results.stored_results import ConditionResults
 
 SIZES = ["size_1", "size_2", "size_3"]  # box: half its edges; else radius and half the length
@@ -51,17 +51,17 @@ def triangles(row: Any) -> FloatArray:
         for names in (TURN, SIZES, "xyz")
     )
     whole = 2.0 * size if row.shape == "box" else size * (1.0, 2.0, 0.0)  # halves in the table
-    return surfaces.triangles_of(row.shape, whole, None) @ turn.reshape(3, 3).T + place
+    return motion_scenes.triangles_of(row.shape, whole, None) @ turn.reshape(3, 3).T + place
 
 
 def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS` in axes in space, or as seen along z in plane ones."""
     faces = triangles(row)
     if not hasattr(axes, "zaxis"):
-        seen = surfaces.outline_from_above(faces)
+        seen = motion_scenes.outline_from_above(faces)
         axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
         return
-    shades = surfaces.shaded(faces, colour, alpha)
+    shades = motion_scenes.shaded(faces, colour, alpha)
     surface = Poly3DCollection(faces, facecolors=shades, linewidth=0, zorder=1)
     surface.set_rasterized(True)  # hundreds of triangles
     axes.add_collection3d(surface)
@@ -87,7 +87,7 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
         joints = (data.oMi[item.parentJoint] for item in geometry.geometryObjects)
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
             for start, end, radius in zip(cover.start, cover.end, cover.radius, strict=True):
-                pose, length = surfaces.capsule(start, end)
+                pose, length = motion_scenes.capsule(start, end)
                 middle, turn = joint.act(pose.translation), (joint.rotation @ pose.rotation).ravel()
                 sizes = radius, 0.5 * length, 0.0
                 kind = "capsule" if length else "sphere"

@@ -49,11 +49,8 @@ def costs_table(results: Results, threshold: float) -> pd.DataFrame:
     """Return every run's best cost."""
     parts = []
     for position, c in enumerate(results.with_data):
-        columns: dict[str, Any] = {
-            "position": position,
-            "condition": c.label,
-            "replicate": c.summaries.index,
-        }
+        columns: dict[str, Any] = {"position": position, "condition": c.label}
+        columns |= {"replicate": c.summaries.index}
         columns |= {"cost": c.column("best_cost"), "refuted": measures.refuted(c) == 1.0}
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
@@ -118,11 +115,8 @@ def methods_table(
         curve |= {"value": finite.mean(axis=1).to_numpy()}
         curve |= {"deviation": finite.std(axis=1, ddof=1).to_numpy()}
         curve |= {"replicates": finite.notna().sum(axis=1).to_numpy()}
-        final: dict[str, Any] = {
-            "series": FINAL,
-            "replicate": c.summaries.index[drawn],
-            "value": c.column("best_cost")[drawn],
-        }
+        final: dict[str, Any] = {"series": FINAL, "replicate": c.summaries.index[drawn]}
+        final |= {"value": c.column("best_cost")[drawn]}
         final |= {"refuted": (measures.refuted(c) == 1.0)[drawn]}
         own: dict[str, Any] = {"position": position, "method": c.label}
         own |= {"panel": panels.get(c.label, len(pairs)), "hall": bool(c.planner.ga.hall_depth)}

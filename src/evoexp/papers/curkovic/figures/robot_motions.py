@@ -61,16 +61,12 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
         path = _path(prepared, measures.sampled(prepared, solution, POINTS))
         parts.append(path.assign(replicate=replicate))
         if replicate == best:
-            parts += [
-                _links(prepared, measures.sampled(prepared, solution, samples)).assign(
-                    element=element
-                )
-                for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1))
-            ]
+            for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1)):
+                links = _links(prepared, measures.sampled(prepared, solution, samples))
+                parts.append(links.assign(element=element))
     parts.append(pd.DataFrame(contacts, columns=names))
-    table = rounded(pd.concat(parts, ignore_index=True)).assign(
-        best=best, length_unit=condition.length_unit
-    )
+    table = rounded(pd.concat(parts, ignore_index=True))
+    table = table.assign(best=best, length_unit=condition.length_unit)
     return table[[*names, "best", "length_unit"]]
 
 
@@ -95,11 +91,8 @@ def draw_motion(table: pd.DataFrame) -> Figure:
         along = np.array([row.x_end - row.x, row.y_end - row.y])
         x, y = row.radius * np.array([-along[1], along[0]]) / float(np.hypot(*along))
         for side in (-1.0, 1.0):
-            ends = (
-                [row.x + side * x, row.x_end + side * x],
-                [row.y + side * y, row.y_end + side * y],
-            )
-            trail.plot(*ends, **look)
+            ends = np.array([row.x, row.x_end]), np.array([row.y, row.y_end])
+            trail.plot(ends[0] + side * x, ends[1] + side * y, **look)
     for (robot, replicate), rows in groups(path, ["robot", "replicate"]):
         colour = style.arm_colour(int(robot))
         if replicate == best:
@@ -136,9 +129,8 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
             refuted=shown in motion_geometry.refuted(c),
         )
         parts.append(given)
-    table = rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=conditions[0].length_unit
-    )
+    table = rounded(pd.concat(parts, ignore_index=True))
+    table = table.assign(length_unit=conditions[0].length_unit)
     return table.drop(columns=["element", "link", "radius"])
 
 
@@ -338,10 +330,8 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
     _, x, y, x_end, y_end, _ = rows[1]
     at = (x + mu[k] * (x_end - x), y + mu[k] * (y_end - y))
     rows += [("base", *one.base, *two.base, np.nan), ("point", *at, *at, np.nan)]
-    table = rounded(
-        pd.DataFrame(rows, columns=["element", "x", "y", "x_end", "y_end", "angle_deg"])
-    )
-    return table.assign(
+    names = ["element", "x", "y", "x_end", "y_end", "angle_deg"]
+    return rounded(pd.DataFrame(rows, columns=names)).assign(
         mu=round(float(mu[k]), 9),
         nu=round(float(nu[k]), 9),
         share=float(steps[k, 0, 0]),

@@ -14,7 +14,7 @@ from evoexp.papers import trails
 from evoexp.papers.rana import measures
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, records, rounded, style, surfaces
+from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -142,11 +142,9 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     least, (a, b) = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
     rows.append(("bodies", -1, *a[:2], *b[:2], np.nan, least))
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(
-        safety_distance=problem.security_margin,
-        instant=instant,
-        length_unit=condition.length_unit,
-    )
+    table = rounded(pd.DataFrame(rows, columns=names))
+    table = table.assign(safety_distance=problem.security_margin, instant=instant)
+    return table.assign(length_unit=condition.length_unit)
 
 
 def draw_circles(table: pd.DataFrame) -> Figure:
@@ -220,9 +218,9 @@ def draw_arm(table: pd.DataFrame) -> Figure:
         trails.draw_base(axes, links, "xyz")
     _name_points(axes, 0, links)
     size = np.array([table["radius"].max(), 0.0, 0.0])
-    ball = surfaces.triangles_of("sphere", size, None)
+    ball = motion_scenes.triangles_of("sphere", size, None)
     for centre in spheres[["x", "y", "z"]].to_numpy():
-        shades = surfaces.shaded(ball, colour, 0.25)
+        shades = motion_scenes.shaded(ball, colour, 0.25)
         figure.axes[0].add_collection(Poly3DCollection(ball + centre, facecolors=shades, lw=0))
     return figure
 
@@ -247,7 +245,7 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     above.set_title("b  from above, with each arm's reach")
     turn = np.linspace(0.0, 2.0 * np.pi, 121)
     for (arm, instant), links in groups(table, ["arm", "instant"]):
-        colour, look = style.arm_colour(arm), trails.DASHED if instant else {}
+        colour, look = style.arm_colour(arm), {"linestyle": trails.DASHES} if instant else {}
         for place, names in ((axes, "xyz"), (above, "xy")):
             trails.draw_chain(place, links, colour, names, **look)
             trails.draw_base(place, links, names)

@@ -173,7 +173,7 @@ class MessagePart:
         """A pose; an absent one is the frame's own."""
         place = self["position"] or self["translation"]
         turn = self["orientation"] or self["rotation"]
-        return Pose(turn._rotation() if turn else np.eye(3), place.point if place else np.zeros(3))
+        return Pose(turn.rotation() if turn else np.eye(3), place.point if place else np.zeros(3))
 
     @property
     def point(self) -> FloatArray:
@@ -185,7 +185,7 @@ class MessagePart:
             return self
         return MessagePart([self.value.get(key, 0) for key in keys], self.field, self.where)
 
-    def _rotation(self) -> FloatArray:
+    def rotation(self) -> FloatArray:
         """Return the rotation of a quaternion x, y, z, w of any length but 0."""
         x, y, z, w = (float(part) for part in self._listed("xyzw").numbers(4))
         size = x * x + y * y + z * z + w * w

@@ -6,6 +6,7 @@ stochastic trajectory optimisation in the manner of STOMP, and iterated local se
 
 import itertools
 import math
+from decimal import Decimal
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -191,10 +192,11 @@ class IteratedLocalSearch(RealVectorControl):
         judged = yield population
         order = np.argsort(judged.cost, kind="stable")[: self.num_chains]
         chains, costs = population[..., order][vectors.changes].T, judged.cost[order]
+        lowest = float(Decimal(self.least).ln())  # rounded correctly, whatever the C library does
         for index in itertools.count(1):
             count = self.num_evaluations(index)
             one, other = rng.integers(self.num_drawn, size=(2, count))
-            logarithms = math.log(self.least) * rng.random(count)
+            logarithms = lowest * rng.random(count)
             sizes = self.sigma / math.sqrt(2.0) * np.array([exp(x) for x in logarithms.tolist()])
             steps = sizes * (vectors.drawn[:, one] - vectors.drawn[:, other])
             of = np.arange(count) % len(chains)

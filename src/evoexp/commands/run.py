@@ -5,6 +5,7 @@ import contextlib
 import functools
 import hashlib
 import importlib.util
+import re
 import shlex
 import sys
 import tempfile
@@ -21,12 +22,13 @@ from rich.table import Table
 
 from evoexp.batch.jobs import Curve, Outcome, read_curves
 from evoexp.batch.runner import Batch
+from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.commands.command_parser import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.list_ import run_row, run_table
-from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.configuration.overrides import SWEEP
 from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
 from evoexp.registry import COMPONENTS, lacking, registrations
@@ -61,12 +63,6 @@ def main(arguments: argparse.Namespace) -> int:
     )
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    command = shlex.join(["evoexp", "run", *arguments.overrides, *option_words(arguments)])
-    wanted = [
-        (each, each.num_replicates(experiment.num_replicates), experiment.origin(label, command))
-        for experiment in experiments
-        for label, each in _that_can_run(experiment)
-    ]
     runner = experiments[0].runner
     if arguments.live and runner.backend != "loky":
         raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
@@ -75,21 +71,111 @@ def main(arguments: argparse.Namespace) -> int:
         if arguments.live:
             folder = tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True)
             curves = Path(stack.enter_context(folder))
-        batch = Batch(
-            wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
+        runs = Runs(arguments, runner, curves)
+        searched = [each for each in experiments if each.search is not None]
+        plain = [each for each in experiments if each.search is None]
+        if plain:
+            runs.complete([(each, arguments.overrides) for each in plain])
+        for experiment in searched:
+            run_trials(experiment, runs, arguments.overrides)
+    if searched:  # the conditions are those of all trials now
+        experiments = compose.expand(
+            arguments.overrides, multirun=arguments.multirun, only=arguments.only
         )
-        batch.prepare()
-        left = batch.num_left_failed
-        failures = _run(batch, wanted, curves)
-    if left:
+    if runs.num_left:
+        left = runs.num_left
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         say(f"{which}: evoexp list --failed; run again with --retry-failed")
     try:
         _show(experiments, arguments)
     finally:
-        if failures:
-            say(_failure_table(batch, failures))
-    return 1 if failures or left else 0
+        if runs.failures:
+            say(_failure_table(runs.failures))
+    return 1 if runs.failures or runs.num_left else 0
+
+
+class Runs:
+    """Runs what is missing of experiments; counts what failed."""
+
+    def __init__(
+        self, arguments: argparse.Namespace, runner: RunnerSettings, curves: Path | None
+    ) -> None:
+        self.failures: list[Outcome] = []
+        self.num_left = 0  # replicates that failed before and are not run again
+        self._arguments, self._runner, self._curves = arguments, runner, curves
+
+    def complete(
+        self, asked: Sequence[tuple[Experiment, Sequence[str]]], *, told: bool = True
+    ) -> None:
+        """Run the missing replicates of experiments, each asked for by its overrides.
+
+        Not `told`, it leaves no line behind.
+        """
+        again = option_words(self._arguments)
+        wanted = [
+            (
+                each,
+                each.num_replicates(experiment.num_replicates),
+                experiment.origin(label, command),
+            )
+            for experiment, overrides in asked
+            for command in (shlex.join(["evoexp", "run", *overrides, *again]),)
+            for label, each in _that_can_run(experiment)
+        ]
+        settings, retry = (self._runner, outputs_root()), self._arguments.retry_failed
+        batch = Batch(wanted, *settings, retry_failed=retry, curves=self._curves)
+        batch.prepare()
+        self.num_left += batch.num_left_failed
+        if not batch.jobs:
+            if batch.is_damaged:
+                deque(batch.run(), maxlen=0)  # mends what is no replicate
+            if told and not batch.num_left_failed:
+                say("nothing to run: every replicate is there")
+            return
+        planned = sorted({count for _, count, _ in wanted})
+        if told:
+            counts = " or ".join(map(str, planned))
+            say(f"replicates of each condition, fixed before they run: {counts}")
+        counted = Counter(job.condition_id for job in batch.jobs)
+        labels = {condition.id: notes["label"] for condition, _, notes in wanted}
+        missing = {key: (labels[key], counted[key]) for key in counted}
+        bars = BatchProgress(plain_console(), missing, self._curves, told=told)
+        with bars.shown(), contextlib.closing(batch.run()) as outcomes:
+            for outcome in outcomes:
+                bars.count(outcome)
+                if outcome.reason:
+                    self.failures.append(outcome)
+                    failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
+                    print(f"{failed}: {printable(outcome.reason)}", file=sys.stderr)
+
+
+def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> None:
+    """Run the missing trials of an experiment's search; say how each one did."""
+    search = experiment.search
+    if search is None:
+        return
+    fixed = [
+        word
+        for word in overrides
+        if word.partition("=")[0] not in search.space and not re.match(rf"{SWEEP}[.=]", word)
+    ]
+    with search.held():
+        runs.complete([(experiment.of(search.base), fixed)])
+        best, total = search.best(), search.settings.num_trials
+        while asked := search.ask():
+            words = [
+                [f"{key}={text}" for key, text in each.trial.settings.items()] for each in asked
+            ]
+            trials = [experiment.of(each.conditions) for each in asked]
+            added = [
+                (own, [*fixed, *own_words]) for own, own_words in zip(trials, words, strict=True)
+            ]
+            runs.complete(added, told=False)
+            for each, own_words in zip(asked, words, strict=True):
+                score = search.tell(each)
+                best = min(best, score)
+                trial = f"trial {each.trial.number} of {total}: score {score:.4g}, best {best:.4g}"
+                say(f"{trial}: {' '.join(own_words)}")
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:
@@ -100,31 +186,6 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
     if all(lacks.values()):
         raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
     return [each for each in experiment.conditions if not lacks[each.label]]
-
-
-def _run(
-    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
-) -> list[Outcome]:
-    if not batch.jobs:
-        if batch.is_damaged:
-            deque(batch.run(), maxlen=0)  # mends what is no replicate
-        if not batch.num_left_failed:
-            say("nothing to run: every replicate is there")
-        return []
-    planned = sorted({count for _, count, _ in wanted})
-    say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
-    failures, counts = [], Counter(job.condition_id for job in batch.jobs)
-    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    missing = {key: (labels[key], counts[key]) for key in counts}
-    bars = BatchProgress(plain_console(), missing, curves)
-    with bars.shown(), contextlib.closing(batch.run()) as outcomes:
-        for outcome in outcomes:
-            bars.count(outcome)
-            if outcome.reason:
-                failures.append(outcome)
-                failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
-                print(f"{failed}: {printable(outcome.reason)}", file=sys.stderr)
-    return failures
 
 
 def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> None:
@@ -192,11 +253,12 @@ def summary_table(experiment: Experiment) -> Table:
     return table
 
 
-def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:
+def _failure_table(failures: list[Outcome]) -> Table:
     title = f"{len(failures)} failed"
     table = new_table(title, hash_column(), *right("#"), "reason", "traceback in")
     for outcome in failures:
-        path = batch.runs[outcome.condition_id].failure_path(outcome.replicate)
+        run = RunDirectory(outputs_root(), outcome.condition_id)
+        path = run.failure_path(outcome.replicate)
         table.add_row(outcome.condition_id[:12], str(outcome.replicate), outcome.reason, str(path))
     return table
 
@@ -215,12 +277,16 @@ class BatchProgress(progress.Progress):
         wanted: Mapping[str, tuple[str, int]],
         curves: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        told: bool = True,
     ) -> None:
         """Prepare; shown inside `shown`.
 
         Args:
             wanted: Condition's id → its label, and its replicates to run.
             curves: Folder in which workers leave the convergence of what they run; None: not shown.
+            clock: Returns the time [s].
+            told: Whether the last state stays.
         """
         texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
         texts += ["{task.fields[curve]}"] if curves is not None else []
@@ -233,8 +299,9 @@ class BatchProgress(progress.Progress):
             console=console,
             get_time=clock,
             speed_estimate_period=SPEED_OVER_S,
+            transient=not told,
         )
-        self._curves, self._last_line = curves, clock()
+        self._curves, self._last_line, self._told = curves, clock(), told
         self._rows = {
             key: self.add_task(label, total=total, visible=False, failed=0, best="", curve="")
             for key, (label, total) in wanted.items()
@@ -248,12 +315,12 @@ class BatchProgress(progress.Progress):
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
-        """Show it while the body runs; leave its last state."""
+        """Show it while the body runs."""
         if not self.console.is_terminal:
             try:
                 yield
             finally:
-                if self.tasks[-1].completed:
+                if self._told and self.tasks[-1].completed:
                     self._say()
             return
         if self._curves is not None:

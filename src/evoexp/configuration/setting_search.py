@@ -12,7 +12,7 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from filelock import FileLock, Timeout
 
@@ -23,9 +23,6 @@ from evoexp.report.results.stored_results import gather
 from evoexp.report.results.trials import Searched, Trial, score_table
 from evoexp.store.run_directory import outputs_root
 from evoexp.validation import Count, NonNegativeCount, Positive, Settings
-
-if TYPE_CHECKING:
-    import optuna
 
 DIGITS = 4  # of a number that is proposed: as many as one types
 REFUSED = "refused"  # attribute of a trial whose settings do not go together: why
@@ -120,17 +117,14 @@ class Search:
         return self.folder / "journal.log"
 
     @functools.cached_property
-    def study(self) -> "optuna.Study":
+    def study(self) -> Any:
         """The study; it is created where there is none."""
         optuna = _optuna()
         self.folder.mkdir(parents=True, exist_ok=True)
         backend = optuna.storages.journal.JournalFileBackend(str(self.journal))
         storage = optuna.storages.JournalStorage(backend)
         name = self.folder.name
-        study: optuna.Study = optuna.create_study(
-            storage=storage, study_name=name, load_if_exists=True
-        )
-        return study
+        return optuna.create_study(storage=storage, study_name=name, load_if_exists=True)
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:

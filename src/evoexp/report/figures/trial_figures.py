@@ -1,6 +1,7 @@
 """Figures of a search of settings: scores trial by trial, by setting, and what matters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -42,7 +43,12 @@ def draw_slices(table: pd.DataFrame) -> Figure:
             axes.margins(x=0.2)
         elif values.min() > 0.0 and values.max() > ORDERS * values.min():
             axes.set_xscale("log")
-        look = {"c": found["trial"], "cmap": "Blues", "vmin": -0.5 * len(found), "s": 18}
+        look: dict[str, Any] = {
+            "c": found["trial"],
+            "cmap": "Blues",
+            "vmin": -0.5 * len(found),
+            "s": 18,
+        }
         axes.scatter(values, found["score"], edgecolors=style.NEUTRAL, linewidths=0.4, **look)
         _draw_own(axes, table)
         axes.set_xlabel(key)
@@ -53,7 +59,7 @@ def draw_slices(table: pd.DataFrame) -> Figure:
 
 
 def _draw_own(axes: Axes, table: pd.DataFrame) -> None:
-    look = {"color": "black", "linestyle": "--", "linewidth": 0.8}
+    look: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 0.8}
     axes.axhline(table["score"].iloc[0], label="the experiment as it is", **look)
 
 
@@ -73,7 +79,7 @@ def importance_table(importance: Mapping[str, float]) -> pd.DataFrame:
 def draw_importance(table: pd.DataFrame) -> Figure:
     """Draw the importance of the settings as bars."""
     figure, (axes,) = style.panels(0.3 * len(table) + 0.9)
-    places: Sequence[float] = np.arange(len(table))
+    places = np.arange(len(table))
     axes.barh(places, table["importance"], color=style.condition_colour(0), height=0.6)
     for place, share in zip(places, table["importance"], strict=True):
         marks.beside(axes, place, f"{share:.2f}")

@@ -166,16 +166,20 @@ def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> 
             words = [
                 [f"{key}={text}" for key, text in each.trial.settings.items()] for each in asked
             ]
-            trials = [experiment.of(each.conditions) for each in asked]
             added = [
-                (own, [*fixed, *own_words]) for own, own_words in zip(trials, words, strict=True)
+                (experiment.of(each.conditions), [*fixed, *own])
+                for each, own in zip(asked, words, strict=True)
+                if not each.refusal
             ]
-            runs.complete(added, told=False)
-            for each, own_words in zip(asked, words, strict=True):
-                score = search.tell(each)
-                best = min(best, score)
-                trial = f"trial {each.trial.number} of {total}: score {score:.4g}, best {best:.4g}"
-                say(f"{trial}: {' '.join(own_words)}")
+            if added:
+                runs.complete(added, told=False)
+            for each, own in zip(asked, words, strict=True):
+                told = f"refused: {each.refusal}"
+                if not each.refusal:
+                    score = search.tell(each)
+                    best = min(best, score)
+                    told = f"score {score:.4g}, best {best:.4g}"
+                say(f"trial {each.trial.number} of {total}: {told} · {' '.join(own)}")
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:
@@ -342,7 +346,8 @@ class BatchProgress(progress.Progress):
         self.update(self._rows[key], advance=1, failed=self._failed[key], best=best)
         self.update(self._all, advance=1, failed=sum(self._failed.values()))
         now = self.get_time()
-        if not self.console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
+        is_told = self._told and not self.console.is_terminal
+        if is_told and now - self._last_line >= PLAIN_INTERVAL_S:
             self._last_line = now
             self._say()
 

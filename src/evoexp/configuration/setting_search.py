@@ -44,8 +44,9 @@ class Asked(NamedTuple):
     """A trial that Optuna asks for."""
 
     trial: Trial
-    conditions: dict[str, Built]  # by label
-    number: int  # of the trial in the study, which counts interrupted ones
+    conditions: dict[str, Built]  # by label; none if it is refused
+    study_number: int  # which counts interrupted trials, too
+    refusal: str = ""  # why its settings do not go together
 
 
 class Search:
@@ -78,7 +79,6 @@ class Search:
         """
         self.settings, self.space, self.folder = settings, space, folder
         self.num_replicates, self._build = num_replicates, build
-        self._known: dict[int, tuple[Trial, dict[str, Built]]] = {}  # by number in the study
         own = build({})
         self._own = [each.condition.id for each in own.values()]
         changed = set[int]()
@@ -105,11 +105,14 @@ class Search:
 
     def _trial(self, number: int, params: Mapping[str, Any]) -> tuple[Trial, dict[str, Built]]:
         """Return a trial, `number` among the finished ones, and its conditions by label."""
-        values = {key: _value(self.space[key], params[key]) for key in self.space}
+        values = {key: _value(override, params[key]) for key, override in self.space.items()}
         every = list(self._built(values).items())
         built = dict(every[k] for k in self._changed)
-        texts = {key: value.text for key, value in values.items()}
-        return Trial(number, texts, tuple(b.condition.id for b in built.values())), built
+        ids = tuple(each.condition.id for each in built.values())
+        return Trial(number, self._texts(params), ids), built
+
+    def _texts(self, params: Mapping[str, Any]) -> dict[str, str]:
+        return {key: _value(each, params[key]).text for key, each in self.space.items()}
 
     @property
     def journal(self) -> Path:
@@ -145,24 +148,24 @@ class Search:
     def _finished(self) -> list[Any]:
         """Return the trials of the study that have a score, or were refused."""
         states = _optuna().trial.TrialState
-        return self.study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
+        finished = states.COMPLETE, states.PRUNED
+        return list(self.study.get_trials(deepcopy=False, states=finished))
 
     def ask(self) -> list[Asked]:
-        """Return the next trials, refused ones left out; none if all are finished."""
+        """Return the next trials; none if all are finished. Refused ones are finished at once."""
         optuna, asked = _optuna(), list[Asked]()
         distributions = {key: _distribution(override) for key, override in self.space.items()}
-        while not asked and (done := len(self._finished())) < self.settings.num_trials:
-            count = min(self.settings.num_at_once, self.settings.num_trials - done)
-            for number in range(done + 1, done + count + 1):
-                self.study.sampler = self._sampler(number)
-                trial = self.study.ask(distributions)
-                try:
-                    own, conditions = self._trial(number, trial.params)
-                except EvoexpError as error:
-                    trial.set_user_attr(REFUSED, str(error))
-                    self.study.tell(trial, state=optuna.trial.TrialState.PRUNED)
-                    continue
-                asked.append(Asked(own, conditions, trial.number))
+        done, at_once = len(self._finished()), self.settings.num_at_once
+        for number in range(done + 1, min(done + at_once, self.settings.num_trials) + 1):
+            self.study.sampler = self._sampler(number)
+            trial = self.study.ask(distributions)
+            try:
+                asked.append(Asked(*self._trial(number, trial.params), trial.number))
+            except EvoexpError as error:
+                own = Trial(number, self._texts(trial.params), ())
+                asked.append(Asked(own, {}, trial.number, str(error)))
+                trial.set_user_attr(REFUSED, str(error))
+                self.study.tell(trial, state=optuna.trial.TrialState.PRUNED)
         return asked
 
     def _sampler(self, number: int) -> Any:
@@ -181,7 +184,7 @@ class Search:
         searched = self._searched((first, asked.trial))
         table = score_table(searched, {c.condition.id: c for c in found.conditions})
         score = float(table.loc[table["trial"] > 0, "score"].mean())
-        self.study.tell(asked.number, score)
+        self.study.tell(asked.study_number, score)
         return score
 
     def best(self) -> float:
@@ -197,8 +200,8 @@ class Search:
         if self.journal.exists():
             for number, trial in enumerate(self._finished(), 1):
                 if trial.value is None:
-                    values = ((key, _value(self.space[key], v)) for key, v in trial.params.items())
-                    words = " ".join(f"{key}={value.text}" for key, value in values)
+                    texts = self._texts(trial.params)
+                    words = " ".join(f"{key}={text}" for key, text in texts.items())
                     refused[words] = trial.user_attrs[REFUSED]
                     continue
                 own, built = self._trial(number, trial.params)

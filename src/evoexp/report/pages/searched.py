@@ -9,6 +9,7 @@ from evoexp.report.figures import records
 from evoexp.report.results.stored_results import Results
 from evoexp.report.results.trials import Searched, Trial, score_table
 
+MUCH_MORE = 1.1  # queries of a trial, in those of the experiment as it is
 MOST_ROWS = 10  # trials in the table of the best ones; the data have all
 
 
@@ -21,12 +22,10 @@ def trial_table(searched: Searched, search_scores: pd.DataFrame) -> pd.DataFrame
     """Return the trials in their order.
 
     Columns trial (0: the experiment as it is), score, best (least score so far, the experiment as
-    it is included), proven and runs (of all problems), and one per setting.
+    it is included), proven and runs (of all problems), queries (mean per run), and one per setting.
     """
-    by_trial = search_scores.groupby("trial").agg(
-        score=("score", "mean"), proven=("proven", "sum"), runs=("runs", "sum")
-    )
-    table = by_trial.reset_index()
+    by_trial = search_scores.groupby("trial", as_index=False)
+    table = by_trial.agg({"score": "mean", "proven": "sum", "runs": "sum", "queries": "mean"})
     table.insert(2, "best", table["score"].cummin())
     for key in searched.trials[-1].settings:
         table[key] = [trial.settings.get(key, "") for trial in searched.trials]
@@ -40,12 +39,13 @@ def best_trial(searched: Searched, trials: pd.DataFrame) -> Trial:
 
 def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) -> dict[str, object]:
     """Return the words of the page's texts."""
+    *others, last = (f"`{key}`" for key in searched.trials[-1].settings)
     rows = {row.trial: row for row in records(trials)}
     best, own = rows[best_trial.number], rows[0]
     return {
         "count": len(searched.trials) - 1,
-        "settings": " and ".join(f"`{key}`" for key in searched.trials[-1].settings),
-        "problems": len(searched.problems),
+        "settings": " and ".join([", ".join(others), last] if others else [last]),
+        "problems": f"{count} problems" if (count := len(searched.problems)) > 1 else "one problem",
         "replicates": searched.num_replicates,
         "unsolved": f"{searched.unsolved:g}",
         "best": f"`{words_of(best_trial)}`",
@@ -61,7 +61,13 @@ def best_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[object
     best = trials.sort_values("score", kind="stable").head(MOST_ROWS)
     for row in records(pd.concat([best, trials[:1]]).drop_duplicates("trial")):
         words = next(words_of(each) for each in searched.trials if each.number == row.trial)
-        yield row.trial, f"`{words}`", f"{row.score:.3g}", f"{row.proven} of {row.runs}"
+        yield (
+            row.trial,
+            f"`{words}`",
+            f"{row.score:.3g}",
+            f"{row.proven} of {row.runs}",
+            f"{row.queries:,.0f}",
+        )
 
 
 def problem_rows(best_trial: Trial, search_scores: pd.DataFrame) -> Iterator[tuple[object, ...]]:
@@ -87,6 +93,9 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ),
     "trials": lambda searched, search_scores: trial_table(searched, search_scores),
     "importance_is_known": lambda searched: bool(searched.importance),
+    "effort_differs": lambda trials: (
+        trials["queries"].max() > MUCH_MORE * trials["queries"].iloc[0]
+    ),
     "has_trials": lambda searched: len(searched.trials) > 1,
     "importance": lambda searched: searched.importance,
     "refused_rows": lambda searched: tuple(searched.refused.items()),

@@ -51,7 +51,7 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.
         runs: Results by the id of their condition.
 
     Returns:
-        Columns trial, problem, score, proven (runs), runs (planned).
+        Columns trial, problem, score, proven (runs), runs (planned), queries (mean per run).
     """
     rows, references = [], dict[str, float]()
     for trial in searched.trials:
@@ -65,6 +65,8 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.
             ratios = np.ones(len(costs)) if np.isnan(reference) else costs / reference
             missing = searched.num_replicates - len(costs)
             score = (ratios.sum() + searched.unsolved * missing) / searched.num_replicates
-            numbers = float(score), len(costs), searched.num_replicates
+            queries = runs[key].column("collision_queries")[first].mean() if first.any() else 0.0
+            numbers = float(score), len(costs), searched.num_replicates, float(queries)
             rows.append((trial.number, problem, *numbers))
-    return pd.DataFrame(rows, columns=["trial", "problem", "score", "proven", "runs"])
+    names = ["trial", "problem", "score", "proven", "runs", "queries"]
+    return pd.DataFrame(rows, columns=names)

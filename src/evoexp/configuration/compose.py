@@ -132,7 +132,7 @@ def parse(text: str) -> Override:
 def _span(key: str, interval: Any, typed: str) -> Span:
     low, high, is_log = interval.start, interval.end, "log" in interval.tags
     if key in groups() or not -math.inf < low < high < math.inf or (is_log and low <= 0):
-        must = "a setting=interval(low,high), low < high; of tag(log,interval(…)) both above 0"
+        must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
         raise SettingError(key, must, typed)
     return Span(low, high, 1 if isinstance(low, int) else None, is_log)
 
@@ -162,7 +162,7 @@ class Composer:
 
         Of a user's folders only the options count.
         """
-        root = Path(tempfile.mkdtemp(prefix="evoexp-"))
+        root = Path(tempfile.mkdtemp())
         weakref.finalize(self, shutil.rmtree, root, ignore_errors=True)
         self.root, self.file = root, file
         self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options

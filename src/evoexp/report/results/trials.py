@@ -43,8 +43,8 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.
     """Return the score of every trial on every problem.
 
     A run that is proven counts its cost, divided by the mean cost of the proven runs of trial 0 on
-    the same problem (1 where there are none); any other run counts `unsolved`. The score of a trial
-    is the mean over runs and problems.
+    the same problem (of all its runs where none is proven), `unsolved` at most; any other run
+    counts `unsolved`. The score of a trial is the mean over runs and problems.
 
     Args:
         searched: Problems and trials.
@@ -60,9 +60,12 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.
             holds = proven(runs[key]) & first
             costs = runs[key].column("best_cost")[holds]
             if trial.number == 0:
-                references[problem] = float(costs.mean()) if len(costs) else np.nan
+                every = runs[key].column("best_cost")[first]
+                finite = costs if len(costs) else every[np.isfinite(every)]
+                references[problem] = float(finite.mean()) if len(finite) else np.inf
             reference = references[problem]
-            ratios = np.ones(len(costs)) if np.isnan(reference) else costs / reference
+            ratios = costs / reference if np.isfinite(reference) else np.ones(len(costs))
+            ratios = np.minimum(ratios, searched.unsolved)
             missing = searched.num_replicates - len(costs)
             score = (ratios.sum() + searched.unsolved * missing) / searched.num_replicates
             queries = runs[key].column("collision_queries")[first].mean() if first.any() else 0.0

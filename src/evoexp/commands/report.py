@@ -185,7 +185,7 @@ def request_of(
         experiment.num_replicates,
         shlex.join(words),
         experiment.options,
-        searched=experiment.search.found()[0] if experiment.search else None,
+        searched=experiment.search.found() if experiment.search else None,
     )
 
 

@@ -13,7 +13,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import progress
@@ -27,7 +27,7 @@ from evoexp.commands.command_parser import option_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.list_ import run_row, run_table
 from evoexp.configuration import compose
-from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.configuration.experiment import Built, Experiment, Labelled
 from evoexp.configuration.overrides import SWEEP
 from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
@@ -35,6 +35,9 @@ from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.report_settings import page_registration
 from evoexp.store.identity import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
+
+if TYPE_CHECKING:
+    from evoexp.report.results.trials import Trial
 
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
@@ -159,27 +162,31 @@ def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> 
         for word in overrides
         if word.partition("=")[0] not in search.space and not re.match(rf"{SWEEP}[.=]", word)
     ]
+
+    def asked_for(trial: "Trial", conditions: dict[str, Built]) -> tuple[Experiment, list[str]]:
+        return experiment.of(conditions), [*fixed, *typed(trial)]
+
     with search.held():
-        runs.complete([(experiment.of(search.base), fixed)])
+        stored = (asked_for(*each) for each in search.stored)
+        runs.complete([(experiment.of(search.base), fixed), *stored])
         best, total = search.best(), search.settings.num_trials
         while asked := search.ask():
-            words = [
-                [f"{key}={text}" for key, text in each.trial.settings.items()] for each in asked
-            ]
-            added = [
-                (experiment.of(each.conditions), [*fixed, *own])
-                for each, own in zip(asked, words, strict=True)
-                if not each.refusal
-            ]
-            if added:
-                runs.complete(added, told=False)
-            for each, own in zip(asked, words, strict=True):
+            if taken := [each for each in asked if not each.refusal]:
+                runs.complete(
+                    [asked_for(each.trial, each.conditions) for each in taken], told=False
+                )
+            for each in asked:
                 told = f"refused: {each.refusal}"
                 if not each.refusal:
                     score = search.tell(each)
                     best = min(best, score)
                     told = f"score {score:.4g}, best {best:.4g}"
-                say(f"trial {each.trial.number} of {total}: {told} · {' '.join(own)}")
+                say(f"trial {each.trial.number} of {total}: {told} · {' '.join(typed(each.trial))}")
+
+
+def typed(trial: "Trial") -> list[str]:
+    """Return the settings of a trial as one types them."""
+    return [f"{key}={text}" for key, text in trial.settings.items()]
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:

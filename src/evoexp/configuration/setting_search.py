@@ -14,11 +14,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from evoexp.configuration.experiment import Built, Experiment
 from evoexp.configuration.overrides import SWEEP, Choice, Override, Value
-from evoexp.errors import Busy, EvoexpError, SettingError
+from evoexp.errors import Busy, EvoexpError, SettingError, StoreError, brief
 from evoexp.report.results.stored_results import gather
 from evoexp.report.results.trials import Searched, Trial, score_table
 from evoexp.store.run_directory import outputs_root
@@ -125,9 +126,15 @@ class Search:
         optuna = _optuna()
         self.folder.mkdir(parents=True, exist_ok=True)
         backend = optuna.storages.journal.JournalFileBackend(str(self.journal))
-        storage = optuna.storages.JournalStorage(backend)
-        name = self.folder.name
-        return optuna.create_study(storage=storage, study_name=name, load_if_exists=True)
+        try:
+            storage = optuna.storages.JournalStorage(backend)
+            name = self.folder.name
+            return optuna.create_study(storage=storage, study_name=name, load_if_exists=True)
+        except (ValueError, LookupError, TypeError) as error:
+            remedy = "delete it: the same trials are proposed again, their runs are kept"
+            raise StoreError(
+                f"{self.journal}: is damaged ({brief(str(error), 80)}); {remedy}"
+            ) from None
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -170,7 +177,8 @@ class Search:
 
     def _sampler(self, number: int) -> Any:
         """Return a sampler whose proposal depends on nothing but finished trials and a number."""
-        samplers, seed = _optuna().samplers, self.settings.seed + number
+        samplers = _optuna().samplers
+        seed = int(np.random.SeedSequence((self.settings.seed, number)).generate_state(1)[0])
         if self.settings.sampler == "random":
             return samplers.RandomSampler(seed=seed)
         return samplers.TPESampler(seed=seed, constant_liar=self.settings.num_at_once > 1)
@@ -192,32 +200,42 @@ class Search:
         scores = (trial.value for trial in self._finished() if trial.value is not None)
         return min(scores, default=math.inf)
 
-    def found(self) -> tuple[Searched, dict[str, Built]]:
-        """Return what is known so far, and the conditions of all trials by label, each once."""
-        conditions = {built.condition.id: label for label, built in self.base.items()}
-        every, trials = dict(self.base), [Trial(0, {}, tuple(conditions))]
-        refused, importance = dict[str, str](), dict[str, float]()
-        if self.journal.exists():
-            for number, trial in enumerate(self._finished(), 1):
-                if trial.value is None:
-                    texts = self._texts(trial.params)
-                    words = " ".join(f"{key}={text}" for key, text in texts.items())
-                    refused[words] = trial.user_attrs[REFUSED]
-                    continue
-                own, built = self._trial(number, trial.params)
-                trials.append(own)
-                for label, each in built.items():
-                    if conditions.setdefault(each.condition.id, label) == label:
-                        every[label] = each
-            importance = self._importance(len(trials) - 1)
-        found = self._searched(tuple(trials))
-        return found._replace(refused=refused, importance=importance), every
+    @functools.cached_property
+    def stored(self) -> list[tuple[Trial, dict[str, Built]]]:
+        """The trials that were finished when this was first asked for, with their conditions."""
+        finished = enumerate(self._finished(), 1) if self.journal.exists() else ()
+        return [self._trial(k, each.params) for k, each in finished if each.value is not None]
+
+    @property
+    def conditions(self) -> dict[str, Built]:
+        """The conditions of the problems and of all stored trials by label, each once."""
+        known = {built.condition.id: label for label, built in self.base.items()}
+        return self.base | {
+            label: built
+            for _, conditions in self.stored
+            for label, built in conditions.items()
+            if known.setdefault(built.condition.id, label) == label
+        }
+
+    def found(self) -> Searched:
+        """Return what is known so far."""
+        first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
+        found = self._searched((first, *(trial for trial, _ in self.stored)))
+        if not self.journal.exists():
+            return found
+        refused = {
+            " ".join(f"{key}={text}" for key, text in self._texts(trial.params).items()): reason
+            for trial in self._finished()
+            if (reason := trial.user_attrs.get(REFUSED))
+        }
+        return found._replace(refused=refused, importance=self._importance())
 
     def _searched(self, trials: tuple[Trial, ...]) -> Searched:
         return Searched(tuple(self.base), trials, self.num_replicates, self.settings.unsolved)
 
-    def _importance(self, num_trials: int) -> dict[str, float]:
+    def _importance(self) -> dict[str, float]:
         """Return the importance of each setting for being among the best trials (PED-ANOVA)."""
+        num_trials = len(self.stored)
         if num_trials < FEWEST or len(self.space) < 2:
             return {}
         importance = _optuna().importance
@@ -241,7 +259,7 @@ def with_search(
     name = f"{plain}+{hashlib.sha256(repr(about).encode()).hexdigest()[:8]}"
     folder = outputs_root() / "searches" / name
     search = Search(settings, space, experiment.num_replicates, folder, build)
-    return experiment.of(search.found()[1])._replace(search=search)
+    return experiment.of(search.conditions)._replace(search=search)
 
 
 def _optuna() -> Any:

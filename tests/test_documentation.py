@@ -271,3 +271,19 @@ def test_verdicts_of_a_paper_are_those_that_are_stored(paper: str) -> None:
     assert page == update.with_table(page, stored), "run: scripts/update-verdicts"
     claims = registered_rules(registered(CLAIMS, paper))
     assert stored and {row["name"] for row in stored} <= {*claims}, "run: scripts/update-verdicts"
+
+
+def test_figures_of_the_architecture_are_those_of_the_imports(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    update = script("update-architecture")
+    stored = {path.name: path.read_text(encoding="utf-8") for path in update.FIGURES.iterdir()}
+    assert update.figures() == stored, "run: scripts/update-architecture"
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    rooms = (path.parent.name for path in update.SOURCE.glob("*/__init__.py"))
+    assert all(f"| `{room}` |" in page for room in rooms)
+    wrong = update.Station(0, "cli.py", ""), update.Station(1, "condition.py", "", "Batch")
+    monkeypatch.setattr(update, "WAYS", {"log": wrong})
+    assert update.main([]) == 2
+    must = "error: log: cli.py must import Batch from condition.py, imports nothing\n"
+    assert capsys.readouterr().err == must

@@ -255,14 +255,15 @@ def _narrowest(cells: Cells) -> FloatArray:
 
 
 def _columns(cells: Cells) -> Iterator[Cells]:
-    """Yield tables of as many columns as there is room for; each has the first column."""
+    """Yield tables of as many columns as there is room for; each begins with name and unit."""
     narrowest = _narrowest(cells)
-    taken = [0]
-    for k in range(1, len(narrowest)):
+    names = [0, 1] if cells[0][1:2] == ["unit"] else [0]
+    taken = names
+    for k in range(len(names), len(narrowest)):
         if narrowest[[*taken, k]].sum() > PAGE:
             yield [[row[j] for j in taken] for row in cells]
-            taken = [0]
-        taken.append(k)
+            taken = names
+        taken = [*taken, k]
     yield [[row[j] for j in taken] for row in cells]
 
 

@@ -30,7 +30,7 @@ from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import DIED_TWICE, Died, Workers
 from evoexp.condition import Condition
-from evoexp.errors import EvoexpError, portable, printable
+from evoexp.errors import EvoexpError, printable
 from evoexp.records import Block, ReplicateSummary, generations
 from evoexp.version import __version__
 
@@ -106,10 +106,9 @@ def run_jobs(
                 hear = None if curves is None else CurveFile(curves, *job.key).hear
                 content, summary = run_replicate(condition, job.replicate, job.condition_json, hear)
         except Exception as error:
-            trace = portable(traceback.format_exc())
+            trace = traceback.format_exc()
             is_late = isinstance(error, TookTooLong)
-            words = str(error) if is_late else f"{type(error).__name__}: {error}"
-            reason = portable(words).splitlines()[0]
+            reason = str(error) if is_late else f"{type(error).__name__}: {error}".splitlines()[0]
             may_pass = is_late or isinstance(error, MemoryError)
         wall_s = time.perf_counter() - start
         outcomes.append(Outcome(*job.key, reason, trace, content, wall_s, summary, may_pass))

@@ -245,16 +245,15 @@ def keys_below(
     figure: Figure | SubFigure, keys: Sequence[Artist], columns: int | None = None
 ) -> None:
     """Put a legend under the whole figure, in as many columns as are wanted (None: all) and fit."""
-    look: dict[str, Any] = {"loc": "outside lower center"}
     for count in range(max(columns or len(keys), 1), 0, -1):
-        legend = figure.legend(handles=keys, ncols=count, **look)
-        surplus = legend.get_window_extent().width - figure.bbox.width
-        if surplus <= 0.0 or count == 1:
+        legend = figure.legend(handles=keys, ncols=count, loc="outside lower center")
+        surplus = max(legend.get_window_extent().width - figure.bbox.width, 0.0)
+        if not surplus or count == 1:
             break
         legend.remove()
     widest = max((_length(text, False) for text in legend.get_texts()), default=0.0)
     for text in legend.get_texts():
-        _break(text, widest - max(surplus, 0.0))
+        _break(text, widest - surplus)
 
 
 def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:

@@ -20,13 +20,13 @@ MAX_COUNT = 10**9
 LARGEST = 1e100
 SMALLEST = 1e-100  # besides 0: the reciprocal of a smaller number overflows, or its square vanishes
 
-Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
+Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]  # at least 1, at most a thousand million
 NonNegativeCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 # Configurations of a path, pieces of a segment: laid out one by one before anything is run.
 LayoutCount = Annotated[int, Field(ge=1, le=10_000)]
-Rate = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
+Rate = Annotated[float, Field(ge=0.0, le=1.0)]  # a probability or share in [0, 1]
+Positive = Annotated[float, Field(gt=0.0)]  # above 0
+NonNegative = Annotated[float, Field(ge=0.0)]  # 0 or above
 Vector = tuple[float, ...]
 
 

@@ -20,7 +20,7 @@ from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.errors import DamagedStore, SettingError
+from evoexp.errors import DamagedStore, SettingError, portable
 from evoexp.store import summaries
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import LogContents, read_log
@@ -147,6 +147,8 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
     assert failure["reason"] == read_summaries(directory)["stop_reason"][1] == REASON.format(1)
     assert failure["traceback"].startswith("Traceback (most recent call last):\n")
     assert failure["traceback"].endswith("to fail\nand says why\n")
+    assert 'File "evoexp/batch/jobs.py"' in failure["traceback"], "no folder of this machine"
+    assert portable("no file '/home/me/a/b.stl', 2 m/s") == "no file 'b.stl', 2 m/s"
     assert read_summaries(directory)["status"].tolist() == ["done", "failed", "done"]
     assert "1 replicate failed before" in " ".join(said(1, "--no-report")[0].split())
     assert main(["list", "--failed"]) == 0

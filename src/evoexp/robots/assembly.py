@@ -131,7 +131,7 @@ class Robot(Component):
         return []
 
     def build(self) -> Assembly:
-        """Append all arms to one model, with q = (arm 0, arm 1, …)."""
+        """Return all arms in one Pinocchio model with coal bodies, q = (arm 0, arm 1, …)."""
         return assembled(self.chains())
 
 

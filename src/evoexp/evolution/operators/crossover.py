@@ -12,7 +12,7 @@ from evoexp.validation import NonNegative
 
 @kernel
 def copy_parents(genomes: FloatArray, parents: IntArray, out: FloatArray) -> None:
-    """Write the parents themselves, to be changed pair by pair."""
+    """Write the parents (genes, offspring) themselves to `out`, to be changed pair by pair."""
     for gene in range(len(genomes)):
         source, target = genomes[gene], out[gene]
         for k in range(len(parents)):

@@ -39,7 +39,7 @@ class Context(NamedTuple):
     normals: FloatArray  # (genes, ≥ offspring) normal deviates for a mutation that takes them
     rate: float  # probability in [0, 1]: of a pair to be crossed, or of a mutation
     progress: float  # t / T of the parents' generation, 0 of the initial one
-    settings: FloatArray  # of the operator, see `Operator.settings`
+    settings: FloatArray  # values of the operator's fields in their order, true as 1
     genome: Genome  # limits and layout of the genes
 
 

@@ -190,19 +190,16 @@ def draw_shares(table: pd.DataFrame) -> Figure:
     beyond = MARGIN * max(high - low, 1.0)
     for axes, quantity in zip(panels, quantities, strict=True):
         every = table[table["quantity"] == quantity]
-        own = every[every["total"] > 0]
         for position, rows in groups(every, "position"):
             colour, y = style.row_colour(int(position), len(labels)), rows_of[position]
             if rows["total"].iloc[0]:
-                axes.hlines(
-                    y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
-                )
+                ends = 100 * rows["lower"], 100 * rows["upper"]
+                axes.hlines(y, *ends, color=colour, linewidth=1.6)
                 axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
             counts = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
             marks.beside(axes, y, counts, 1.0)
-        if len(own):
-            for printed in own["printed"].dropna().unique():
-                marks.dashed(axes, 100 * printed)
+        for printed in every.loc[every["total"] > 0, "printed"].dropna().unique():
+            marks.dashed(axes, 100 * printed)
         axes.set_xlim(low - beyond, high + beyond)
         is_wide = high - low >= NEARLY_ALL
         axes.xaxis.set_major_locator(MultipleLocator(25.0) if is_wide else style.few_ticks())

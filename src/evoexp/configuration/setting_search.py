@@ -10,6 +10,7 @@ import contextlib
 import functools
 import hashlib
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -122,19 +123,21 @@ class Search:
 
     @functools.cached_property
     def study(self) -> Any:
-        """The study; it is created where there is none."""
+        """The study as it is stored; None if there is none."""
+        return self._opened(_optuna().load_study) if self.journal.exists() else None
+
+    def _opened(self, study: Callable[..., Any], **how: bool) -> Any:
         optuna = _optuna()
-        self.folder.mkdir(parents=True, exist_ok=True)
         backend = optuna.storages.journal.JournalFileBackend(str(self.journal))
         try:
             storage = optuna.storages.JournalStorage(backend)
-            name = self.folder.name
-            return optuna.create_study(storage=storage, study_name=name, load_if_exists=True)
-        except (ValueError, LookupError, TypeError) as error:
+            return study(storage=storage, study_name=self.folder.name, **how)
+        except KeyError:  # the journal has no whole line
+            return None
+        except (ValueError, LookupError, TypeError, AssertionError) as error:
             remedy = "delete it: the same trials are proposed again, their runs are kept"
-            raise StoreError(
-                f"{self.journal}: is damaged ({brief(str(error), 80)}); {remedy}"
-            ) from None
+            reason = brief(str(error), 80)
+            raise StoreError(f"{self.journal}: is damaged ({reason}); {remedy}") from None
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -145,6 +148,8 @@ class Search:
         self.folder.mkdir(parents=True, exist_ok=True)
         try:
             with FileLock(self.folder / ".lock", timeout=0):
+                self._cut()
+                self.study = self._opened(_optuna().create_study, load_if_exists=True)
                 for trial in self.study.get_trials(deepcopy=False):
                     if not trial.state.is_finished():
                         self.study.tell(trial.number, state=_optuna().trial.TrialState.FAIL)
@@ -152,11 +157,17 @@ class Search:
         except Timeout:
             raise Busy(f"{self.folder}: another process goes on with this search now") from None
 
+    def _cut(self) -> None:
+        """Cut off a line of the journal that a process did not finish writing."""
+        if self.journal.exists():
+            content = self.journal.read_bytes()
+            os.truncate(self.journal, content.rfind(b"\n") + 1)
+
     def _finished(self) -> list[Any]:
         """Return the trials of the study that have a score, or were refused."""
         states = _optuna().trial.TrialState
-        finished = states.COMPLETE, states.PRUNED
-        return list(self.study.get_trials(deepcopy=False, states=finished))
+        finished = {"deepcopy": False, "states": (states.COMPLETE, states.PRUNED)}
+        return [] if self.study is None else list(self.study.get_trials(**finished))
 
     def ask(self) -> list[Asked]:
         """Return the next trials; none if all are finished. Refused ones are finished at once."""
@@ -203,7 +214,7 @@ class Search:
     @functools.cached_property
     def stored(self) -> list[tuple[Trial, dict[str, Built]]]:
         """The trials that were finished when this was first asked for, with their conditions."""
-        finished = enumerate(self._finished(), 1) if self.journal.exists() else ()
+        finished = enumerate(self._finished(), 1)
         return [self._trial(k, each.params) for k, each in finished if each.value is not None]
 
     @property
@@ -221,8 +232,6 @@ class Search:
         """Return what is known so far."""
         first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
         found = self._searched((first, *(trial for trial, _ in self.stored)))
-        if not self.journal.exists():
-            return found
         refused = {
             " ".join(f"{key}={text}" for key, text in self._texts(trial.params).items()): reason
             for trial in self._finished()

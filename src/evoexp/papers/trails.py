@@ -122,7 +122,7 @@ def space_of_links(figure: Figure, place: tuple[int, int, int], links: pd.DataFr
 
 
 def space(
-    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, zoom: float = 0.95
+    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, zoom: float = 0.9
 ) -> Any:
     """Return axes in space, with equal scales, that hold some points (points, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)

@@ -153,7 +153,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     level = float(table["significance"].iloc[0])
     dot: dict[str, Any] = {"marker": "o", "linestyle": "none", **DOT}
-    keys = style.key(f"adjusted p < {level:g}", **dot), style.key(f"≥ {level:g}", **dot, **OPEN)
+    keys = style.key(f"adjusted p < {level:g}", **dot), style.key(f"p ≥ {level:g}", **dot, **OPEN)
     is_clear = table["p_adjusted"] < level
     style.keys_below(figure, [keys[k] for k in (0, 1) if (is_clear == (k == 0)).any()])
     return figure

@@ -169,10 +169,8 @@ def _panels(table: pd.DataFrame, height: float, room: Callable[[int], pd.DataFra
 def draw_joints(table: pd.DataFrame) -> Figure:
     """Draw every joint in a panel of its own, four side by side, with its limits."""
     joints = list(table.groupby("joint", sort=False))
-    lines = -(-len(joints) // 4)
-    figure = style.figure(1.4 * lines + 0.2)
-    for k, (joint, own) in enumerate(joints):
-        axes = figure.add_subplot(lines, 4, k + 1)
+    figure, panels = style.panels(1.4, len(joints), 4, 0.2)
+    for axes, (joint, own) in zip(panels, joints, strict=True):
         axes.plot(own["instant"], own["value"], color=style.arm_colour(0))
         for bound in own[["low", "high"]].iloc[0]:
             if np.isfinite(bound):
@@ -182,7 +180,7 @@ def draw_joints(table: pd.DataFrame) -> Figure:
         axes.tick_params(labelsize=6.5)
         axes.yaxis.set_major_locator(style.few_ticks())
         axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
-        if k >= len(joints) - 4:
+        if style.ends_column(axes, panels):
             axes.set_xlabel("instant", fontsize=7)
     return figure
 

@@ -188,13 +188,12 @@ def verdict_class(verdict: str) -> str:
 
 def number_columns(headers: Sequence[str], rows: Sequence[Sequence[object]]) -> Mapping[int, bool]:
     """Return position → whether every cell of a column begins with a number, or has no value."""
-    found = {}
-    for k in range(len(headers)):
-        cells = [text for row in rows if (text := str(row[k])) not in NO_VALUE]
-        found[k] = bool(cells) and all(
-            len(text) <= LONGEST_NUMBER and _NUMBER.match(text) for text in cells
-        )
-    return found
+    columns = [[str(row[k]) for row in rows] for k in range(len(headers))]
+    known = [[text for text in own if text not in NO_VALUE] for own in columns]
+    return {
+        k: bool(own) and all(len(text) <= LONGEST_NUMBER and _NUMBER.match(text) for text in own)
+        for k, own in enumerate(known)
+    }
 
 
 MAX_LINKS = 3  # reports named beside a run
@@ -220,9 +219,9 @@ class ReportSummary(NamedTuple):
     headings: tuple[tuple[str, str], ...] = ()
     claims: tuple[tuple[str, str], ...] = ()  # (text, verdict) of the paper's sentences
     questions: tuple[tuple[str, str], ...] = ()  # (text, verdict) of questions of ours
-    rules: tuple[tuple[str, str], ...] = ()  # (text of a claim, name of its rule)
     runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
     picture: Picture = ""  # the figure that shows best what it is about; empty if there is none
+    rules: tuple[tuple[str, str], ...] = ()  # (text of a claim, name of its rule)
 
     @property
     def experiment(self) -> str:

@@ -128,5 +128,5 @@ def space(
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 4)}
+    look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 3)}
     return motion_scenes.space(figure, place, low, high, pad, unit, zoom=zoom, **look)

@@ -55,12 +55,14 @@ def draw_cost(table: pd.DataFrame) -> Figure:
 
 
 def draw_best(table: pd.DataFrame) -> Figure:
-    """Draw medians of the best cost only, for many conditions at once, named at their ends."""
+    """Draw medians of the best cost only, many curves without quartiles, named at their ends."""
     best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
     across, curves = _across(best), list(groups(best, ["position", "condition"]))
     figure, (axes,) = style.panels(max(4.4, LINE * len(curves)))
     for k, ((_, condition), curve) in enumerate(curves):
         look = style.curve_look(k) | {"linewidth": 1.2}
+        if len(curves) < marks.MANY:
+            marks.band(axes, curve[across], curve["lower"], curve["upper"], look["color"])
         axes.plot(curve[across], curve["median"], label=f"{condition} ({_counts(curve)})", **look)
     limits = (0, max(1, int(best[across].max())))
     axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")

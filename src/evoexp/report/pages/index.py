@@ -70,7 +70,7 @@ def document(
 
 
 def _asked(page: Page, experiment: str) -> str:
-    """Return what a shipped experiment is about, where the title of its page only names it."""
+    """Return the description of a shipped experiment whose page has but its name as title."""
     if not experiment or experiment not in page.title:
         return ""
     text = described(config_directory() / "experiment" / f"{experiment}.yaml")

@@ -245,7 +245,8 @@ def test_a_claim_counts_once_that_of_the_readings_first() -> None:
     scene = summary("rana_planar")._replace(rules=(("free", "rule"),))
     told = (("planar: free", "depends on the reading (…)"),)
     readings = summary("rana_claims")._replace(claims=told, rules=(("planar: free", "rule"),))
-    (card,) = html_page.site([scene, readings], [RANA], [])["papers"]
+    paper = RANA._replace(claims={"rana_planar": 3, "rana_claims": 1})
+    (card,) = html_page.site([scene, readings], [paper], [])["papers"]
     counts = (("depends on the reading", 1), ("contradicted", 1), ("not judged", 1))
     assert [own for _, own in card["tallies"]] == [counts, (("undecided", 1),)]
 

@@ -358,10 +358,10 @@ def _judged_once(paper: Paper, reports: Sequence[ReportSummary]) -> Iterator[Rep
     The page of readings comes first: what it judges counts there alone.
     """
     readings = f"{paper.name}_claims"
-    places = {name: k for k, name in enumerate((readings, *paper.claims))}
+    order = list(dict.fromkeys((readings, *paper.claims, *(each.folder for each in reports))))
     known, judged = set[str](), dict[str, set[str]]()  # sentences; rule → the runs it is judged on
     every = {name for each in reports for name, _ in each.runs}
-    for each in sorted(reports, key=lambda report: places.get(report.folder, len(places))):
+    for each in sorted(reports, key=lambda report: order.index(report.folder)):
         rules, runs = dict(each.rules), {name for name, _ in each.runs}
         told = [text for text, _ in (*each.claims, *each.questions)]
         new = {text for text in told if runs - judged.get(rules.get(text, text), set())} - known

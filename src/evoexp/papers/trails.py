@@ -122,11 +122,11 @@ def space_of_links(figure: Figure, place: tuple[int, int, int], links: pd.DataFr
 
 
 def space(
-    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, zoom: float = 0.95
+    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, zoom: float = 0.9
 ) -> Any:
     """Return axes in space, with equal scales, that hold some points (points, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 4)}
+    look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 3)}
     return motion_scenes.space(figure, place, low, high, pad, unit, zoom=zoom, **look)

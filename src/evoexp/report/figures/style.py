@@ -278,6 +278,8 @@ def fit_texts(figure: Figure) -> bool:
         (text, part.bbox.x1 - text.get_window_extent().x0) for part in parts for text in part.texts
     ]
     for axes in figure.axes:
+        axes.apply_aspect()  # which moves what has equal scales
+    for axes in figure.axes:
         # a title may go up to the next panel beside its own, or to the edge of the figure
         box, ends = axes.get_window_extent(), [figure.bbox.x1]
         for other in figure.axes:

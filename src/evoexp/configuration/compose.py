@@ -94,6 +94,7 @@ def search_space(overrides: Choice) -> Choice:
     if not space:
         must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
         raise SettingError(SWEEP, must, " ".join(each.text for each in swept.values()))
+    syntax.refuse_equal_values(space)
     return space
 
 

@@ -147,6 +147,12 @@ def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
         if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
             must = "one value: a sweep is over what changes a condition"
             raise SettingError(key, must, override.typed)
+    refuse_equal_values(overrides)
+
+
+def refuse_equal_values(overrides: Choice) -> None:
+    """Refuse overrides that are swept over one value twice."""
+    for key, override in overrides.items():
         texts = [value.text for value in override.values]
         if key != EXPERIMENT and len(set(texts)) < len(texts):
             raise SettingError(key, "values that differ", override.typed)

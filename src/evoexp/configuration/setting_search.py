@@ -178,7 +178,10 @@ class Search:
             self.study.sampler = self._sampler(number)
             trial = self.study.ask(distributions)
             try:
-                asked.append(Asked(*self._trial(number, trial.params), trial.number))
+                own, conditions = self._trial(number, trial.params)
+                for built in conditions.values():
+                    built.condition.prepare()  # refuses what does not go together
+                asked.append(Asked(own, conditions, trial.number))
             except EvoexpError as error:
                 own = Trial(number, self._texts(trial.params), ())
                 asked.append(Asked(own, {}, trial.number, str(error)))

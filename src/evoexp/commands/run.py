@@ -113,9 +113,9 @@ def _run(
         return []
     planned = sorted({count for _, count, _ in wanted})
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
+    say("kernels that this machine has not run before are compiled first, for minutes")
     failures, counts = [], Counter(job.condition_id for job in batch.jobs)
-    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    missing = {key: (labels[key], counts[key]) for key in counts}
+    missing = {c.id: (notes["label"], counts[c.id]) for c, _, notes in wanted if c.id in counts}
     bars = BatchProgress(plain_console(), missing, curves)
     with bars.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:

@@ -98,7 +98,7 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
         if what:
             say(f"skipped: {label}: {what}")
     if all(lacks.values()):
-        raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
+        raise SettingError("planner", f"one that is installed: {what}", label)
     return [each for each in experiment.conditions if not lacks[each.label]]
 
 

@@ -185,8 +185,8 @@ def summary_table(experiment: Experiment) -> Table:
         if experiment.budget_of(label) == "smoke":
             caption = "budget=smoke shows that everything runs; its numbers decide nothing"
         if rows[-1]["planned"] > asked:
-            all_of = "all that are stored, here and in the report"
-            caption = f"of {experiment.num_replicates} asked for: {all_of}"
+            count_all = "more are stored, and all count, here and in the report"
+            caption = f"asked for: {experiment.num_replicates} of each; {count_all}"
     table = run_table(experiment.report_name, rows)
     table.caption = caption
     return table

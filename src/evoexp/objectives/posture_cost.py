@@ -23,7 +23,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import model_validator
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE, acos, asin
 from evoexp.records import FloatArray
@@ -133,9 +133,8 @@ class PostureCost(Component):
             if name not in TERMS:
                 must = f"a cost term ({', '.join(TERMS)})"
                 raise SettingError(f"{field}[{k}]", must, name, nearest(name, TERMS))
-            if name not in self.chosen:
-                must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
-                raise SettingError(f"{field}[{k}]", must, name)
+            must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
+            demand(name in self.chosen, f"{field}[{k}]", must, name)
         counting = terms or self.chosen
         given = [getattr(self, name) if name in counting else None for name in TERMS]
         weights = [term.weight if term else 0.0 for term in given]

@@ -168,8 +168,7 @@ def body_geometry(body: AnyBody, field: str) -> tuple[Any, Any]:
         return shape, pin.SE3(np.eye(3), np.array(body.center))
     start, end = np.array(body.start), np.array(body.end)
     reach = length(end - start)
-    if reach == 0.0:
-        raise SettingError(f"{field}.end", "another point than start", list(body.end))
+    demand(reach != 0.0, f"{field}.end", "another point than start", list(body.end))
     kind = coal.Capsule if body.shape == "capsule" else coal.Cylinder
     return kind(body.radius, reach), along(start, end)
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 from pydantic import BeforeValidator
 
 from evoexp import attachments
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.robots.assembly import AppendArm, Assembly, Chain, Point3, assembled
 from evoexp.robots.meshes import Decomposition, mesh_pieces, whole_mesh
 from evoexp.robots.srdf import Srdf
@@ -155,8 +155,7 @@ class Urdf(Chain):
         if "path" not in settings:
             return settings
         path = robot_file(settings.pop("path"), f"{field}.path")
-        if path in (None, "???"):
-            raise SettingError(f"{field}.path", "given: the path of a URDF", None)
+        demand(path not in (None, "???"), f"{field}.path", "given: the path of a URDF", None)
         srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
         packages = attachments.package_folders(settings.pop("packages", None), f"{field}.packages")
         content = attachments.file_content(path, f"{field}.path")

@@ -184,6 +184,5 @@ def _read_png(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def _check_size(size: tuple[int, ...], was: tuple[int, ...], field: str) -> None:
-    if was != tuple(size):
-        expected, counts = (" × ".join(map(str, shape)) for shape in (size, was))
-        raise SettingError(field, f"a map of {expected} nodes, as scenario.size says", counts)
+    expected, counts = (" × ".join(map(str, shape)) for shape in (size, was))
+    demand(was == tuple(size), field, f"a map of {expected} nodes, as scenario.size says", counts)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.elementary import exp, matrix_product, standard_normal
 from evoexp.planners.planner import (
     COPIES,
@@ -80,10 +80,9 @@ class RealVectorControl(WrappedPlanner):
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
-        if not self.planner.is_real_coded:
-            of = self.planner.component
-            must = f"left out: individuals of {of} are no vectors of real numbers"
-            raise SettingError("control", must, self.component)
+        of = self.planner.component
+        must = f"left out: individuals of {of} are no vectors of real numbers"
+        demand(self.planner.is_real_coded, "control", must, self.component)
         return super().prepare(robot, scenario)
 
     def num_evaluations(self, index: int) -> int:
@@ -105,9 +104,8 @@ def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
     template = np.ascontiguousarray(drawn[..., 0])
     changes = np.asarray((drawn != template[..., None]).any(axis=-1))
     vectors = np.ascontiguousarray(drawn[changes])  # (variables, individuals)
-    if not vectors.size:
-        must = "one whose first individuals differ"
-        raise SettingError("planner", must, planner.component)
+    must = "one whose first individuals differ"
+    demand(vectors.size, "planner", must, planner.component)
     bounds = planner.bounds(problem)  # real-coded ones have them
     return RealVectors(template, changes, vectors, bounds)
 

@@ -20,7 +20,7 @@ from pydantic import model_validator
 from evoexp.collision.planar.arm_pairs import MOST_CONFIGURATIONS
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
@@ -142,9 +142,8 @@ class Coevolution(PlannerDefaults, Component):
         """Build the robots and check that start and goal fit them and are free of collision."""
         assembly = robot.build()
         collision = self.collision.bind(assembly, scenario.obstacles)
-        if len(collision.arms) < 2:
-            must = "two robots or more, which evolve together"
-            raise SettingError("robot", must, len(collision.arms))
+        must = "two robots or more, which evolve together"
+        demand(len(collision.arms) >= 2, "robot", must, len(collision.arms))
         arms = np.array([(*arm.base, *arm.lengths) for arm in collision.arms])
         start, goal = (DEGREE * ends for ends in scenario.ends(arms[:, :2], arms[:, 2:]))
         moving = np.array([r not in scenario.stationary for r in range(len(arms))])

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.random_stream import Draws
 from evoexp.paths.grids import NodeArray
@@ -33,9 +33,8 @@ class PathClimbing(WrappedPlanner):
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
-        if not isinstance(self.planner, GridPathGa):
-            must = f"left out: {self.planner.component} has no paths over a grid"
-            raise SettingError("control", must, self.component)
+        must = f"left out: {self.planner.component} has no paths over a grid"
+        demand(isinstance(self.planner, GridPathGa), "control", must, self.component)
         if self.num_paths > self.planner.num_evaluations(0):
             must = f"at most ga.population_size ({self.planner.num_evaluations(0)})"
             raise SettingError("control.num_paths", must, self.num_paths)

@@ -18,7 +18,7 @@ from pydantic import model_validator
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Part, Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.paths import grids
@@ -159,13 +159,11 @@ class GridPathGa(PlannerDefaults, Component):
         """Return D, S and cost of a path, and the numbers of its faults; with one it costs inf."""
         nodes, own = self._nodes(problem, solution), problem.fields.grid
         last = np.array(own.free.shape) - 3
-        if len(nodes) < 2:
-            raise SettingError("path", "two nodes at least", nodes.tolist())
+        demand(len(nodes) >= 2, "path", "two nodes at least", nodes.tolist())
         are_nodes = ((nodes == np.floor(nodes)) & (nodes >= 0) & (nodes <= last)).all(axis=1)
-        if not are_nodes.all():
-            k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
-            must = f"a node of the grid, whole numbers ({inside})"
-            raise SettingError(f"path[{k}]", must, nodes[k].tolist())
+        k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
+        must = f"a node of the grid, whole numbers ({inside})"
+        demand(are_nodes.all(), f"path[{k}]", must, nodes[k].tolist())
         indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
         path = np.array([len(nodes), *indices], dtype=np.int32)
         made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
@@ -258,9 +256,8 @@ def _prepared(
     scenario: GridMotion,
 ) -> Problem:
     """Prepare a problem, kept for planners that differ in weights and rates alone."""
-    if robot.dimensions != len(scenario.size):
-        must = f"as many as the grid has ({len(scenario.size)})"
-        raise SettingError("robot.dimensions", must, robot.dimensions)
+    must = f"as many as the grid has ({len(scenario.size)})"
+    demand(robot.dimensions == len(scenario.size), "robot.dimensions", must, robot.dimensions)
     fields, margin = collision.bind(scenario.blocked()), scenario.security_margin
     bodies, between = scene(robot.build(), scenario.bodies()), "obstacles"
     if acceptance != "model":
@@ -269,15 +266,13 @@ def _prepared(
     own = fields.grid
     start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
     for name, node in (("start", start), ("goal", goal)):
-        if not own.free.flat[node]:
-            must = "a node of an unsafeness of at most collision.max_unsafeness "
-            must += f"({collision.max_unsafeness:g})"
-            raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
+        must = "a node of an unsafeness of at most collision.max_unsafeness "
+        must += f"({collision.max_unsafeness:g})"
+        demand(own.free.flat[node], f"scenario.{name}", must, float(fields.unsafeness[node]))
     steps = fields.steps_to(goal)
-    if steps[start] == grids.UNREACHED:
-        must = f"a node that can be reached from the start {list(scenario.start)}; "
-        must += f"{between} are between"
-        raise SettingError("scenario.goal", must, list(scenario.goal))
+    must = f"a node that can be reached from the start {list(scenario.start)}; "
+    must += f"{between} are between"
+    demand(steps[start] != grids.UNREACHED, "scenario.goal", must, list(scenario.goal))
     world = World(
         own.neighbours,
         fields.num_moves,

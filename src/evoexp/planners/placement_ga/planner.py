@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.evolution.succession import choose_parents, summarise
 from evoexp.numeric.compilation import borrowed, kernel
@@ -218,10 +218,9 @@ class PlacementGa(PlannerDefaults, Component):
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
         """Build the robot and check that the end-effector can reach its target."""
         reach = sum(robot.link_lengths)
-        if abs(scenario.target[1]) > reach:
-            must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "
-            must += "(the links' lengths together)"
-            raise SettingError("scenario.target", must, list(scenario.target))
+        must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "
+        must += "(the links' lengths together)"
+        demand(abs(scenario.target[1]) <= reach, "scenario.target", must, list(scenario.target))
         task = Task(*robot.link_lengths, *scenario.target, *scenario.force)
         avoided = self.objective.avoided(scenario.obstacle_points())
         model = Model(task, self.objective.weights, avoided, robot.limits)

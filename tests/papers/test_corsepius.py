@@ -15,11 +15,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import claims as paper_claims
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.claims import SizeComparison
-from evoexp.papers.corsepius.figures import (
-    population_effort,
-    posture_motions,
-    solids,
-)
+from evoexp.papers.corsepius.figures import population_effort, posture_motions, solids
 from evoexp.papers.corsepius.measures import ShownPath
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_file import read_page_file

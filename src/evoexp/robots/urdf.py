@@ -78,9 +78,8 @@ class Urdf(Chain):
 
     urdf: attachments.File  # the URDF
     meshes: tuple[Mesh, ...] = ()  # of its collision bodies
-    srdf: attachments.File | None = (
-        None  # names pairs of links that are never judged; None: none are named
-    )
+    # names pairs of links that are never judged; None: none are named
+    srdf: attachments.File | None = None
     # the link, fixed to the ground, whose frame stands at the base; empty: the root
     base_frame: str = ""
     base_position: Point3 = (0.0, 0.0, 0.0)  # where the base stands in the world [m]

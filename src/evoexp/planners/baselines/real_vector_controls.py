@@ -14,13 +14,7 @@ from pydantic import Field
 
 from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.elementary import exp, matrix_product, standard_normal
-from evoexp.planners.planner import (
-    COPIES,
-    Populations,
-    Reproducibility,
-    WrappedPlanner,
-    num_values,
-)
+from evoexp.planners.planner import COPIES, Populations, Reproducibility, WrappedPlanner, num_values
 from evoexp.records import BoolArray, FloatArray
 from evoexp.validation import Count, Positive, Rate
 

@@ -231,10 +231,8 @@ class TeamSearch(TableSearch):
         found = self._planner.evaluated(self._problem, populations)
         settled = self._proven.settle(populations, found) if self._proven else None
         best = kernels.survey(found, self.summaries[place])
-        self.present, self.costs[place] = (
-            kernels.Generation(populations, found, settled or best),
-            found.costs,
-        )
+        self.present = kernels.Generation(populations, found, settled or best)
+        self.costs[place] = found.costs
 
     def lowest(self, places: IntArray) -> FloatArray:
         """Return the cost of the best team."""

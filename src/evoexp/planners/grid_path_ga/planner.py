@@ -69,9 +69,8 @@ class Problem(NamedTuple):
 
     fields: Fields  # grid, unsafeness, potentials
     moves: grids.Moves  # the moves of walks to the goal, and their weights
-    sums: (
-        grids.SumArray
-    )  # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
+    # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
+    sums: grids.SumArray
     ends: tuple[int, int]  # indices of start and goal
     world: World  # grid and fields, as the kernels take them
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
@@ -250,10 +249,7 @@ def trimmed(paths: grids.NodeArray) -> grids.NodeArray:
 
 @functools.lru_cache(maxsize=32)
 def _prepared(
-    collision: PotentialFields,
-    acceptance: Acceptance,
-    robot: FloorPlatform,
-    scenario: GridMotion,
+    collision: PotentialFields, acceptance: Acceptance, robot: FloorPlatform, scenario: GridMotion
 ) -> Problem:
     """Prepare a problem, kept for planners that differ in weights and rates alone."""
     must = f"as many as the grid has ({len(scenario.size)})"

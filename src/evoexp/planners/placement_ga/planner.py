@@ -163,10 +163,7 @@ def flip_strings(draws: Uniforms, strings: IntArray, coding: Coding, count: int)
     u) / ln(1 − p)⌋ (Devroye 1986, section X.2); so a uniform number is taken per flipped bit.
     """
     bits, num = coding.bits, len(strings) * coding.bits
-    staying, place = (
-        log(1.0 - coding.mutation_rate),
-        -1,
-    )  # −inf: each is flipped
+    staying, place = log(1.0 - coding.mutation_rate), -1  # −inf: each is flipped
     while staying < 0.0:
         passed = log(1.0 - draw(draws)) / staying
         if not passed < num * count - 1 - place:

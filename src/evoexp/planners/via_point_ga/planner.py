@@ -30,14 +30,7 @@ from evoexp.planners.via_point_ga.string_operators import NewTrajectories, Strin
 from evoexp.planners.via_point_ga.strings import Problem, Search, Strings, settle, smooth
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.validation import (
-    Component,
-    Count,
-    LayoutCount,
-    NonNegativeCount,
-    Positive,
-    Rate,
-)
+from evoexp.validation import Component, Count, LayoutCount, NonNegativeCount, Positive, Rate
 
 SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled

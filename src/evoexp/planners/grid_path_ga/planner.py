@@ -18,7 +18,7 @@ from pydantic import model_validator
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Part, Scene, scene
-from evoexp.errors import demand
+from evoexp.errors import SettingError, demand
 from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.paths import grids
@@ -262,9 +262,10 @@ def _prepared(
     own = fields.grid
     start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
     for name, node in (("start", start), ("goal", goal)):
-        must = "a node of an unsafeness of at most collision.max_unsafeness "
-        must += f"({collision.max_unsafeness:g})"
-        demand(own.free.flat[node], f"scenario.{name}", must, float(fields.unsafeness[node]))
+        if not own.free.flat[node]:
+            must = "a node of an unsafeness of at most collision.max_unsafeness "
+            must += f"({collision.max_unsafeness:g})"
+            raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
     steps = fields.steps_to(goal)
     must = f"a node that can be reached from the start {list(scenario.start)}; "
     must += f"{between} are between"

@@ -1,7 +1,7 @@
-"""Controls that search among a real-coded planner's individuals as vectors, at its own cost.
+"""Controls: at random, many starts, and searches among individuals as real vectors.
 
-CMA-ES (Hansen & Ostermeier 2001) by the package cmaes, NSGA-II (Deb et al. 2002) by pymoo,
-stochastic trajectory optimisation in the manner of STOMP, and iterated local search.
+They search at a planner's own cost: CMA-ES (Hansen & Ostermeier 2001) by the package cmaes, NSGA-II
+(Deb et al. 2002) by pymoo, trajectory optimisation in the manner of STOMP, iterated local search.
 """
 
 import itertools
@@ -22,6 +22,58 @@ SHRINKAGE = 0.1  # [-] share of a drawn covariance that is replaced by its diago
 LEAST = 1e-6  # [-] of the mean variance: directions in which drawn individuals do not differ
 SEEDS = 2**32  # of numpy's older generators
 ENDLESS = 10**9  # generations: NSGA-II counts them itself
+
+
+class RandomSearch(WrappedPlanner):
+    """Draws individuals as the wrapped planner draws its first ones, as many as it evaluates."""
+
+    component: ClassVar[str] = "random_search"
+
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
+        """Yield one generation of new samples after the other."""
+        for index in itertools.count():
+            yield self.planner.sample(problem, rng, self.planner.num_evaluations(index))
+
+
+class MultiStart(WrappedPlanner):
+    """Draws a population, applies the planner's local operator again and again, and starts anew.
+
+    The first generation of a start holds fresh samples; each of the next `num_sweeps` generations
+    the same individuals after one more pass of the planner's `improve`. A generation evaluates as
+    many as the planner would in it: where that falls, the last are left out; where it rises, fresh
+    samples join.
+    """
+
+    component: ClassVar[str] = "multi_start"
+
+    num_sweeps: Count  # passes of the local operator per start
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem."""
+        problem = super().prepare(robot, scenario)
+        rng = np.random.Generator(np.random.PCG64(0))  # of a trial whose result is thrown away
+        sample = self.planner.sample(problem, rng, 1)
+        if self.planner.improve(problem, sample, rng) is None:
+            must = f"left out: {self.planner.component} has no local operator to be repeated"
+            raise SettingError("control", must, self.component)
+        return problem
+
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
+        """Yield one start after the other: fresh samples, then their sweeps."""
+        planner, population = self.planner, np.empty(0)
+        for index in itertools.count():
+            count, improved = planner.num_evaluations(index), None
+            if index % (self.num_sweeps + 1):
+                improved = planner.improve(problem, population[..., :count], rng)
+                missing = count - population.shape[-1]
+            if improved is None:
+                population = planner.sample(problem, rng, count)
+            elif missing > 0:
+                fresh = planner.sample(problem, rng, missing)
+                population = np.concatenate([improved, fresh], axis=-1)
+            else:
+                population = improved
+            yield population
 
 
 class RealVectors(NamedTuple):

@@ -6,6 +6,7 @@ by its path; nothing is coerced but whole numbers into float fields and lists in
 """
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
@@ -76,11 +77,21 @@ AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
 class Component(Settings):
-    """Settings with a registered name, which `_target_` in a YAML option refers to."""
+    """Settings with a registered name, which `_target_` in a YAML option refers to.
+
+    A class of evoexp that gives itself no name has its class's: `OnePoint` is `one_point`. Bases of
+    several components have none, and say so: `class Crossover(Operator, is_base=True)`.
+    """
 
     component: ClassVar[str]  # the registered name
     # raised whenever the same settings give other results than before; part of every identity
     revision: ClassVar[int] = 1
+
+    def __init_subclass__(cls, is_base: bool = False, **options: Any) -> None:
+        """Name a component of evoexp; a guest's name begins with that of its distribution."""
+        super().__init_subclass__(**options)
+        if cls.__module__.startswith("evoexp.") and not is_base and "component" not in vars(cls):
+            cls.component = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     @model_validator(mode="before")
     @classmethod

@@ -5,7 +5,7 @@ the obstacles the unsafeness of a node; it is the collision model by which its p
 """
 
 from itertools import pairwise
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -42,8 +42,6 @@ class Fields(NamedTuple):
 
 class PotentialFields(Component):
     """Potentials after so many steps of the wave fronts."""
-
-    component: ClassVar[str] = "potential_fields"
 
     neighbourhood: Count  # p: a step of a front changes at most so many coordinates
     # d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with the last

@@ -5,7 +5,7 @@ of θ3 that bring the end-effector to its height, and the platform stands where 
 the target.
 """
 
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -192,8 +192,6 @@ class Avoidance(Settings):
 
 class PlacementCriteria(Component):
     """Weights of E of Eq. 14, which is at most `greatest`, the cost of an infeasible posture."""
-
-    component: ClassVar[str] = "placement_criteria"
 
     torque_norm_weight: NonNegative  # ε, of ‖τ‖² (Eq. 10)
     torque_max_weight: NonNegative  # λ, of the greatest |α τ| (Eq. 11)

@@ -18,7 +18,7 @@ cost is the sum of weight × term. Terms and their units:
 - `free_space` [-]: missing clearance up to `reach`, in units of `reach`; 0 beyond, 1 in contact.
 """
 
-from typing import ClassVar, Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -86,8 +86,6 @@ class FreeSpace(RatioTerm):
 
 class PostureCost(Component):
     """Terms and weights; see the module's first lines."""
-
-    component: ClassVar[str] = "posture_cost"
 
     goal_distance: LengthTerm | None = None
     goal_angle: AngleTerm | None = None

@@ -313,7 +313,7 @@ class Keeper:
         )
 
 
-class WrappedPlanner(PlannerDefaults, Component):
+class WrappedPlanner(PlannerDefaults, Component, is_base=True):
     """Answers as the wrapped planner does; controls write `populations`, references `evolve`."""
 
     planner: Any  # the planner that it stands beside; `Condition` checks that it is one

@@ -122,7 +122,6 @@ def known_maps() -> dict[str, Known]:
 class GridFrontier(Reference):
     """The best path known, and the bound below all paths."""
 
-    component: ClassVar[str] = "grid_frontier"
     revision: ClassVar[int] = 4
 
     planner: GridPathGa  # the path search whose grid and cost it shares

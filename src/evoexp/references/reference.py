@@ -32,7 +32,7 @@ class Truth(NamedTuple):
     arrays: Mapping[str, np.ndarray] = {}
 
 
-class Reference(WrappedPlanner):
+class Reference(WrappedPlanner, is_base=True):
     """Base of every reference; a subclass writes `truth`."""
 
     reproducibility: ClassVar[Reproducibility] = "environment"

@@ -1,6 +1,6 @@
 """Arms given by numbers: planar ones, joint by joint, by a table; and several as one robot."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import coal
 import numpy as np
@@ -30,8 +30,6 @@ Point2 = tuple[float, float]
 
 class PlanarChain(Chain):
     """Revolute joints about z in the x–y plane; a joint angle is relative to the link before."""
-
-    component: ClassVar[str] = "planar_chain"
 
     # lengths from joint to joint, the last to the tip [length unit of the scene]
     link_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
@@ -97,8 +95,6 @@ class SerialChain(Chain):
     stand in the same place have none between them. The segment from the base to the first joint is
     a link that does not move.
     """
-
-    component: ClassVar[str] = "serial_chain"
 
     joints: Annotated[tuple[SerialJoint, ...], Field(min_length=1)]  # from the base to the tip
     tip: Point3  # from the last joint [length unit of the scene]
@@ -201,8 +197,6 @@ class DhChain(Chain):
     body of joint 0 in the base's).
     """
 
-    component: ClassVar[str] = "dh_chain"
-
     # rows of the table, from the base to the last joint
     joints: Annotated[tuple[DhJoint, ...], Field(min_length=1)]
     bodies: Annotated[tuple[AnyBody, ...], Field(min_length=1)]  # what can collide
@@ -253,8 +247,6 @@ class DhChain(Chain):
 
 class Arms(Robot):
     """Arms standing in one scene; q is their configurations one after the other."""
-
-    component: ClassVar[str] = "arms"
 
     arms: Annotated[tuple[Chain, ...], Field(min_length=1)]  # the arms, each with its own base
     # pairs of bodies that need no test, derived when the files of arms out of a URDF are

@@ -1,6 +1,6 @@
 """Platforms that move, with and without an arm of three links (Chen & Zalzala 1995)."""
 
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 import coal
 import numpy as np
@@ -17,8 +17,6 @@ ARM_JOINTS = 3
 
 class FloorPlatform(Chain):
     """An upright cylinder on prismatic joints along x and y, or along x, y and z."""
-
-    component: ClassVar[str] = "floor_platform"
 
     body_radius: Positive  # of the cylinder [length unit of the scene]
     # of the cylinder, which stands on the floor z = 0; in three dimensions it is centred on
@@ -45,8 +43,6 @@ class MobileArm(Chain):
     The first revolute joint stands in the middle of the platform, on the line that the platform
     moves along (y = 0). Every joint angle is relative to the link before.
     """
-
-    component: ClassVar[str] = "mobile_arm"
 
     link_lengths: tuple[Positive, Positive, Positive]  # l1, l2, l3 [length unit of the scene]
     # length and height of the platform, a rectangle with round ends [length unit]
@@ -95,8 +91,6 @@ class FloorManipulator(Chain):
     Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's
     first joint stands in the middle of its top.
     """
-
-    component: ClassVar[str] = "floor_manipulator"
 
     body_radius: Positive  # of the platform [length unit of the scene]
     body_height: Positive  # of the platform

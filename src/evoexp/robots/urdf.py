@@ -9,7 +9,7 @@ import contextlib
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator
 
@@ -168,8 +168,6 @@ class Urdf(Chain):
 
     `packages` tells the folders of packages of meshes, by their names.
     """
-
-    component: ClassVar[str] = "urdf"
 
     urdf: attachments.File  # the URDF
     meshes: tuple[Mesh, ...] = ()  # of its collision bodies

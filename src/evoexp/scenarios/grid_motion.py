@@ -3,7 +3,7 @@
 import io
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -24,8 +24,6 @@ POST = 0.02  # [cell] thickness of bodies that span one node: a box has some
 
 class GridMotion(Component):
     """A path over a grid whose nodes are one length unit apart (Chen & Zalzala 1995, section 2)."""
-
-    component: ClassVar[str] = "grid_motion"
 
     # how many nodes there are along x, y[, z]
     size: Annotated[tuple[Count, ...], Field(min_length=2, max_length=3)]

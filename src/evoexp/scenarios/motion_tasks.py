@@ -8,7 +8,7 @@ A posture task of one phase is a reaching task; manoeuvres such as pick-and-plac
 (Corsépius 2001, section 4.3: fitness functions and termination criteria together make a manoeuvre).
 """
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,8 +27,6 @@ Point2 = tuple[float, float]
 
 class ArmMotion(SceneTask):
     """Start and goal of every arm, and the obstacles around them."""
-
-    component: ClassVar[str] = "arm_motion"
 
     # configuration of every arm at the start, arm by arm [deg]
     q_start: Annotated[tuple[Vector, ...], Field(min_length=1)]
@@ -83,8 +81,6 @@ class Posture(Settings):
 class LinkMotion(SceneTask):
     """Start and goal of every planar robot of two links, and the obstacles around them."""
 
-    component: ClassVar[str] = "link_motion"
-
     # posture of every robot at the start
     q_start: Annotated[tuple[Posture, ...], Field(min_length=2)]
     q_goal: Annotated[tuple[Posture, ...], Field(min_length=2)]  # at the goal
@@ -115,8 +111,6 @@ class LinkMotion(SceneTask):
 class Docking(SceneTask):
     """A place and a load for the tip of a mobile arm (Chen & Zalzala 1995, section 4.2)."""
 
-    component: ClassVar[str] = "docking"
-
     target: Point2  # X_e, Y_e of the end-effector [length unit]
     force: Point2  # F that acts on it (x, y)
 
@@ -131,8 +125,6 @@ class Docking(SceneTask):
 
 class Mission(Component):
     """Both examples of Chen & Zalzala 1995: a platform drives over a grid, then its arm docks."""
-
-    component: ClassVar[str] = "mission"
 
     grid: GridMotion  # the floor; its goal is where the platform is expected to dock
     docking: Docking  # the task of the arm, in a plane whose origin is at `task_origin`
@@ -154,8 +146,6 @@ class Mission(Component):
 
 class PickAndPlace(SceneTask):
     """Start posture, via point and goal point of a planar arm's tip (Lavoie & Boudreau 2001, 4)."""
-
-    component: ClassVar[str] = "pick_and_place"
 
     # posture at the start, joint angles relative to the link before [rad]
     q_start: Annotated[Vector, Field(min_length=1)]
@@ -286,8 +276,6 @@ class Phase(Settings):
 
 class PostureTask(SceneTask):
     """Start posture, phases and surroundings of one arm; obstacles may be grasped."""
-
-    component: ClassVar[str] = "posture_task"
 
     # posture at the start [deg], lengths for sliding joints
     q_start: Annotated[Vector, Field(min_length=1)]

@@ -27,8 +27,6 @@ ENDLESS = 10**9  # generations: NSGA-II counts them itself
 class RandomSearch(WrappedPlanner):
     """Draws individuals as the wrapped planner draws its first ones, as many as it evaluates."""
 
-    component: ClassVar[str] = "random_search"
-
     def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
         """Yield one generation of new samples after the other."""
         for index in itertools.count():
@@ -43,8 +41,6 @@ class MultiStart(WrappedPlanner):
     many as the planner would in it: where that falls, the last are left out; where it rises, fresh
     samples join.
     """
-
-    component: ClassVar[str] = "multi_start"
 
     num_sweeps: Count  # passes of the local operator per start
 
@@ -116,7 +112,7 @@ class Distribution(NamedTuple):
     deviation: float  # root of the mean variance
 
 
-class RealVectorControl(WrappedPlanner):
+class RealVectorControl(WrappedPlanner, is_base=True):
     """Base of the controls that search among the real vectors of a planner's individuals."""
 
     matrices: ClassVar[int] = 1  # of (variables, variables) that a search keeps
@@ -176,7 +172,6 @@ class CmaEs(RealVectorControl):
     bits those of an environment.
     """
 
-    component: ClassVar[str] = "cma_es"
     reproducibility: ClassVar[Reproducibility] = "environment"
     matrices: ClassVar[int] = 12  # the covariance, its parts, and those of an update
 
@@ -220,7 +215,6 @@ class IteratedLocalSearch(RealVectorControl):
     cheapest of its trials in a generation unless that costs more. Chains exchange nothing.
     """
 
-    component: ClassVar[str] = "iterated_local_search"
     matrices: ClassVar[int] = 0
 
     num_chains: Count  # individuals that are improved side by side
@@ -264,7 +258,6 @@ class Nsga2(RealVectorControl):
     first. Linear algebra of libraries makes the last bits those of an environment.
     """
 
-    component: ClassVar[str] = "nsga2"
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     fewest: ClassVar[int] = 4
@@ -324,7 +317,6 @@ class Stomp(RealVectorControl):
     `patience` generations the search starts anew from an individual that the planner draws.
     """
 
-    component: ClassVar[str] = "stomp"
     matrices: ClassVar[int] = 4  # the covariance, its root, and those of its factorisation
 
     sigma: Positive  # standard deviation of the first noise, in those of the drawn individuals [-]

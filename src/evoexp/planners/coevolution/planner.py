@@ -108,7 +108,6 @@ class Problem(NamedTuple):
 class Coevolution(PlannerDefaults, Component):
     """The algorithm of Curkovic et al., sections 2 and 3; Methods I–VIII are settings of it."""
 
-    component: ClassVar[str] = "coevolution"
     revision: ClassVar[int] = 2
 
     # L, even: two link angles for each of K = L/2 configurations between start and goal [-]

@@ -1,7 +1,7 @@
 """Hill climbing on grid paths: the mutation of `grid_path_ga` alone, without evolution."""
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +26,6 @@ class PathClimbing(WrappedPlanner):
     The best `num_paths` of as many random walks as the planner draws are kept; every generation
     makes as many trials as the planner evaluates individuals.
     """
-
-    component: ClassVar[str] = "path_climbing"
 
     num_paths: Count  # paths that climb side by side
 

@@ -47,8 +47,6 @@ BLOCK = 16384  # uniform numbers drawn at once, at least
 class PathCost(Component):
     """Weights of Eq. 1, C = ε D + λ S."""
 
-    component: ClassVar[str] = "path_cost"
-
     distance_weight: NonNegative  # ε, of the length D (Eq. 2) [1/cell]
     unsafeness_weight: NonNegative  # λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-]
 
@@ -80,7 +78,6 @@ class Problem(NamedTuple):
 class GridPathGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 2.3."""
 
-    component: ClassVar[str] = "grid_path_ga"
     revision: ClassVar[int] = 3
 
     revisits: bool  # whether a path may pass a node again; if not, all loops are erased

@@ -194,7 +194,6 @@ class Problem(NamedTuple):
 class PlacementGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 3.2."""
 
-    component: ClassVar[str] = "placement_ga"
     revision: ClassVar[int] = 2
 
     angle_range: Limits  # least and greatest θ1 and θ2 that genes stand for [deg]

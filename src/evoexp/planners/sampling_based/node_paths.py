@@ -195,8 +195,6 @@ class NodePaths(TreePaths, ArmDefaults, Settings):
 class TreeGrowth(Component):
     """How much is searched per record, and in all."""
 
-    component: ClassVar[str] = "tree_growth"
-
     # iterations between two records: random configurations that the trees grow toward, and,
     # once there is a path, attempts to shorten it
     iterations_per_generation: LayoutCount

@@ -35,8 +35,6 @@ MOST_IDLE = 10_000  # iterations of OMPL without a query, after which it is done
 class QueryChunks(Component):
     """How long a planner of a library searches per record, and in all."""
 
-    component: ClassVar[str] = "query_chunks"
-
     # configurations that are asked for between two records; an edge that is being tested is
     # tested to its end
     queries_per_generation: Count

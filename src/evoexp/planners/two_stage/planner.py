@@ -47,8 +47,6 @@ class Problem(NamedTuple):
 class TwoStage(PlannerDefaults, Component):
     """The placement search, then the path search."""
 
-    component: ClassVar[str] = "two_stage"
-
     placement: PlacementGa  # the planner of the first stage
     path: GridPathGa  # the planner of the second one
     # which missions are an answer: those that both stages accept (`model`), or those of them

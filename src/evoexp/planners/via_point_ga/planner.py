@@ -39,7 +39,6 @@ SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between vi
 class ViaPointGa(ArmDefaults, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4 (Tables 1 and 3)."""
 
-    component: ClassVar[str] = "via_point_ga"
     is_real_coded: ClassVar[bool] = True
 
     num_via_points: LayoutCount  # N; instants 1 … N are judged, 0 is the start, N the goal

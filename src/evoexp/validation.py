@@ -49,6 +49,13 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
+    def model_post_init(self, context: Any) -> None:
+        """Check the fields together, once each of them is valid."""
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse fields that contradict each other by a SettingError."""
+
     def demand(self, field: str, holds: bool, must: str) -> None:
         """Refuse these settings by a field of which something does not hold.
 

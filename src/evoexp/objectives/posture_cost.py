@@ -18,10 +18,9 @@ cost is the sum of weight × term. Terms and their units:
 - `free_space` [-]: missing clearance up to `reach`, in units of `reach`; 0 beyond, 1 in contact.
 """
 
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.compilation import kernel
@@ -100,8 +99,7 @@ class PostureCost(Component):
     # times its weight
     grasp_angles: Literal["sum", "larger"] = "sum"
 
-    @model_validator(mode="after")
-    def _terms_agree(self) -> Self:
+    def _check(self) -> None:
         must = "given: every goal is a place"
         self.demand("goal_distance", self.goal_distance is not None, must)
         if self.upright is not None and self.keep_parallel is not None:
@@ -110,7 +108,6 @@ class PostureCost(Component):
         if self.free_space is not None and self.collision is None:
             must = "given with collision, whose distances it rates"
             raise SettingError("free_space", must, self.free_space.weight)
-        return self
 
     @property
     def chosen(self) -> tuple[str, ...]:

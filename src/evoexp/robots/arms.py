@@ -1,11 +1,11 @@
 """Arms given by numbers: planar ones, joint by joint, by a table; and several as one robot."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import coal
 import numpy as np
 import pinocchio as pin
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.attachments import File
 from evoexp.errors import SettingError, demand
@@ -40,13 +40,11 @@ class PlanarChain(Chain):
     # least and greatest angle of every joint [rad], as the papers print them; None: any angle
     joint_limits: tuple[Limits, ...] | None = None
 
-    @model_validator(mode="after")
-    def _limits_fit(self) -> Self:
+    def _check(self) -> None:
         limits = self.joint_limits
         if limits is not None and len(limits) != len(self.link_lengths):
             must = f"one pair per link ({len(self.link_lengths)})"
             raise SettingError("joint_limits", must, len(limits))
-        return self
 
     def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add one revolute joint per link; a tool is a link of no length on the last joint."""
@@ -76,10 +74,8 @@ class SerialJoint(Settings):
     offset: Point3
     kind: Literal["revolute", "prismatic"] = "revolute"  # whether it turns or slides
 
-    @model_validator(mode="after")
-    def _points_somewhere(self) -> Self:
+    def _check(self) -> None:
         demand(any(self.axis), "axis", "a direction, not (0, 0, 0)", list(self.axis))
-        return self
 
     def model(self) -> Any:
         """Return Pinocchio's joint model."""
@@ -206,15 +202,13 @@ class DhChain(Chain):
     # its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across it
     tool_rotation: Point3 = (0.0, 0.0, 0.0)
 
-    @model_validator(mode="after")
-    def _bodies_fit(self) -> Self:
+    def _check(self) -> None:
         names = [body.name for body in self.bodies]
         for k, body in enumerate(self.bodies):
             if body.joint > len(self.joints):
                 raise SettingError(f"bodies[{k}].joint", f"at most {len(self.joints)}", body.joint)
             if body.name in names[:k]:
                 raise SettingError(f"bodies[{k}].name", "a name that no other body has", body.name)
-        return self
 
     def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add the joints; a link is the line from one joint to the next, the last to the tool."""

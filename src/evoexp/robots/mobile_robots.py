@@ -1,11 +1,10 @@
 """Platforms that move, with and without an arm of three links (Chen & Zalzala 1995)."""
 
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import coal
 import numpy as np
 import pinocchio as pin
-from pydantic import model_validator
 
 from evoexp.errors import demand
 from evoexp.records import FloatArray
@@ -53,12 +52,10 @@ class MobileArm(Chain):
     # least and greatest τ1, τ2, τ3; None: any torque (Eq. 9)
     torque_limits: tuple[Limits, Limits, Limits] | None = None
 
-    @model_validator(mode="after")
-    def _is_longer_than_high(self) -> Self:
+    def _check(self) -> None:
         length, height = self.platform_size
         must = "[length, height] with length > height"
         demand(length > height, "platform_size", must, [length, height])
-        return self
 
     @property
     def limits(self) -> FloatArray:

@@ -3,10 +3,10 @@
 import io
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.attachments import File
 from evoexp.errors import SettingError, demand
@@ -37,8 +37,7 @@ class GridMotion(Component):
     obstacles: tuple[Corners, ...] = ()
     map: File | None = None  # A file with more obstacles, see `read_map`
 
-    @model_validator(mode="after")
-    def _nodes_are_inside(self) -> Self:
+    def _check(self) -> None:
         if math.prod(self.size) > MOST_NODES:
             raise SettingError("size", f"of at most {MOST_NODES:,} nodes", list(self.size))
         inside = " × ".join(f"0..{count - 1}" for count in self.size)
@@ -55,7 +54,6 @@ class GridMotion(Component):
             elif self._are_nodes(corners[:half], corners[half:]):
                 continue
             raise SettingError(f"obstacles[{k}]", must, list(corners))
-        return self
 
     def _are_nodes(self, low: tuple[int, ...], high: tuple[int, ...]) -> bool:
         return all(0 <= a <= b < n for a, b, n in zip(low, high, self.size, strict=True))

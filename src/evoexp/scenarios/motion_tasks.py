@@ -8,10 +8,10 @@ A posture task of one phase is a reaching task; manoeuvres such as pick-and-plac
 (Corsépius 2001, section 4.3: fitness functions and termination criteria together make a manoeuvre).
 """
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE, acos, atan2
@@ -56,14 +56,12 @@ class Posture(Settings):
     # the base
     elbow: Literal["left", "right"] | None = None
 
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
+    def _check(self) -> None:
         if (self.angles is None) == (self.tip is None):
             was = None if self.angles is None else "both"
             raise SettingError("angles", "given, or else tip with elbow", was)
         if (self.tip is None) != (self.elbow is None):
             raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
-        return self
 
     def link_angles(self, field: str, base: FloatArray, lengths: FloatArray) -> FloatArray:
         """Return the link angles (2,) [deg] of a robot at a base (2,), with link lengths (2,)."""
@@ -294,8 +292,7 @@ class PostureTask(SceneTask):
     # by which obstacles are judged
     empty_scene: bool = False
 
-    @model_validator(mode="after")
-    def _holds_one_thing_at_a_time(self) -> Self:
+    def _check(self) -> None:
         for k, name in enumerate(self.all_names):
             must = "a name that no other obstacle has"
             demand(name not in self.all_names[:k], f"obstacles[{k}].name", must, name)
@@ -322,7 +319,6 @@ class PostureTask(SceneTask):
                 must = f"given: {field}.contacts allows contacts"
                 raise SettingError("allowed_penetration", must, None)
         demand(any(self.up), "up", "a direction, not (0, 0, 0)", list(self.up))
-        return self
 
     @property
     def objects(self) -> tuple[Obstacle, ...]:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeAlias, TypeVa
 
 import numba
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.records import FloatArray, IntArray
@@ -153,11 +153,9 @@ class PopulationSettings(Component, is_base=True):
     crossover_rate: Rate  # probability that a pair of parents is crossed
     mutation_rate: Rate  # probability of a mutation, of whatever the planner mutates
 
-    @model_validator(mode="after")
-    def _elites_fit(self) -> Self:
+    def _check(self) -> None:
         size = self.population_size
         self.demand("num_elites", self.num_elites <= size, f"at most population_size ({size})")
-        return self
 
     @property
     def num_offspring(self) -> int:

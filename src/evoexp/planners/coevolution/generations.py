@@ -2,10 +2,9 @@
 
 import math
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.evolution.operators import operator
@@ -63,8 +62,8 @@ class CoevolutionSettings(operator.PopulationSettings):
     crossover: operator.Named[operator.Crossover] | None = None  # None: at one point
     mutation: operator.Named[operator.Mutation] | None = None  # None: of one allele (Eq. 9)
 
-    @model_validator(mode="after")
-    def _settings_agree(self) -> Self:
+    def _check(self) -> None:
+        super()._check()
         rate, demand = self.mutation_rate, self.demand
         demand("mutation_decay", self.mutation_decay <= rate, f"at most mutation_rate ({rate})")
         has_hall, no_hall = self.hall_depth > 0.0, "where there is no hall (hall_depth is 0)"
@@ -84,7 +83,6 @@ class CoevolutionSettings(operator.PopulationSettings):
         demand("num_elites", self.num_offspring >= 0, must)
         takes_normals = self.mutation is not None and self.mutation.takes_normals
         demand("mutation", not takes_normals, "one that takes uniform numbers only")
-        return self
 
     @property
     def num_hall_teams(self) -> int:

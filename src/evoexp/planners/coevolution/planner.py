@@ -12,10 +12,9 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import ClassVar, Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.planar.arm_pairs import MOST_CONFIGURATIONS
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
@@ -125,12 +124,10 @@ class Coevolution(PlannerDefaults, Component):
     # count as colliding once more
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _genes_come_in_pairs(self) -> Self:
+    def _check(self) -> None:
         fits = self.chromosome_length >= 2 and self.chromosome_length % 2 == 0
         must = "even and at least 2: two link angles per configuration"
         self.demand("chromosome_length", fits, must)
-        return self
 
     @property
     def num_configurations(self) -> int:

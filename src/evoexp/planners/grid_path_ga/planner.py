@@ -10,10 +10,9 @@ coordinates of its nodes, x, y[, z] of one after the other, as many as there are
 
 import functools
 from collections.abc import Iterator
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
@@ -50,11 +49,9 @@ class PathCost(Component):
     distance_weight: NonNegative  # ε, of the length D (Eq. 2) [1/cell]
     unsafeness_weight: NonNegative  # λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-]
 
-    @model_validator(mode="after")
-    def _something_costs(self) -> Self:
+    def _check(self) -> None:
         must = "above 0, or unsafeness_weight is: else all paths cost 0"
         self.demand("distance_weight", any(self.weights), must)
-        return self
 
     @property
     def weights(self) -> tuple[float, float]:

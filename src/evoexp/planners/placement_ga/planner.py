@@ -10,10 +10,10 @@ flat: θ1, θ2 [deg].
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import demand
@@ -205,11 +205,9 @@ class PlacementGa(PlannerDefaults, Component):
     # `model`: other planners may prove motions, here there are none
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _has_no_motion(self) -> Self:
+    def _check(self) -> None:
         must = "'model': the answer is a posture, there is no motion to prove"
         self.demand("acceptance", self.acceptance == "model", must)
-        return self
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
         """Build the robot and check that the end-effector can reach its target."""

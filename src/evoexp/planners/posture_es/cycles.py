@@ -1,10 +1,9 @@
 """The evolution strategy on postures, cycle by cycle (Corsépius 2001, section 4.2)."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part
@@ -48,12 +47,10 @@ class StrategySettings(Component):
     parent_std: Positive  # of Gaussian parent choice, in units of μ [-]
     crossover_rate: Rate  # probability that a child takes every joint from one of two parents
 
-    @model_validator(mode="after")
-    def _parents_fit(self) -> Self:
+    def _check(self) -> None:
         fits = self.num_parents <= self.num_offspring + self.num_immigrants
         must = f"at most num_offspring ({self.num_offspring}) with comma selection"
         self.demand("num_parents", fits or self.selection == "plus", must)
-        return self
 
     @property
     def population_size(self) -> int:

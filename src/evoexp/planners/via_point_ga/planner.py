@@ -10,10 +10,10 @@ arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
@@ -66,11 +66,9 @@ class ViaPointGa(ArmDefaults, Component):
     # is refuted counts as colliding at one instant more
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _samples_halve(self) -> Self:
+    def _check(self) -> None:
         must = f"one of {', '.join(map(str, SAMPLES))}"
         self.demand("samples_per_segment", self.samples_per_segment in SAMPLES, must)
-        return self
 
     @property
     def operators(self) -> Operators:

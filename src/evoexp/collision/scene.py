@@ -71,12 +71,11 @@ class Scene(NamedTuple):
         """Return the scene with those of its pairs that are kept, (pairs,)."""
         return self._replace(pairs=self.pairs[kept], tolerances=self.tolerances[kept])
 
-    def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
-        """Return the names of the two bodies that are closest, or overlap most, at q (nq,)."""
+    def distances(self, q: FloatArray) -> FloatArray:
+        """Return coal's distances of all pairs of the geometry at q (nq,), negative: overlaps."""
         data, placements = self.model.createData(), self.geometry.createData()
         pin.computeDistances(self.model, data, self.geometry, placements, q)
-        distances = [result.min_distance for result in placements.distanceResults]
-        return self.pair_names(int(np.argmin(distances)))
+        return np.array([result.min_distance for result in placements.distanceResults])
 
 
 class Part(NamedTuple):

@@ -84,11 +84,6 @@ class MotionCriteria(Component):
     # of C4, longest step of the end-effector less its shortest [1/length unit]
     evenness_weight: NonNegative
 
-    @property
-    def own_weights(self) -> tuple[float, float, float]:
-        """Weights of C2, C3, C4, as the kernel `measure_motions` takes them."""
-        return self.path_weight, self.rotation_weight, self.evenness_weight
-
 
 @kernel
 def measure_motions(

@@ -136,7 +136,6 @@ class GeneticSearch(TableSearch):
         genome: operator.Genome,  # of every individual
         per_call: int,  # generations computed per call, at most
     ) -> None:
-        """Begin a run."""
         # normal deviates take no fixed number of uniform ones: generations are drawn one by one
         takes_normals, count = operators.mutation.takes_normals, ga.num_offspring
         super().__init__(ga, 1 if takes_normals else per_call)

@@ -166,7 +166,6 @@ class TeamSearch(TableSearch):
     present: kernels.Generation  # the one computed last
 
     def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
-        """Begin a run."""
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size
         self._proven = ProvenTeams(planner, problem) if planner.answers_are_proven else None

@@ -147,7 +147,8 @@ class Coevolution(PlannerDefaults, Component):
         for name, posture in (("q_start", start), ("q_goal", goal)):
             if contact := collision.contact(posture):
                 relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1)
-                closest = " and ".join(bodies.nearest_pair(relative.ravel()))
+                distances = bodies.distances(relative.ravel())
+                closest = " and ".join(bodies.pair_names(int(np.argmin(distances))))
                 must = f"free of collision ({contact}: {closest})"
                 raise SettingError(f"scenario.{name}", must, (posture / DEGREE).round(9).tolist())
         return Problem(assembly, collision, arms, start, goal, moving, bodies, margin)
@@ -175,9 +176,11 @@ class Coevolution(PlannerDefaults, Component):
     def evaluated(self, problem: Problem, populations: FloatArray) -> kernels.Evaluated:
         """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
         collision, (robots, _, count) = problem.collision, populations.shape
-        weights = self.objective.own_weights, self.objective.collision_weight
+        cost = self.objective
+        own_weights = cost.path_weight, cost.rotation_weight, cost.evenness_weight
         envelope = self.collision.half_width, self.collision.tcp_radius
-        task = kernels.LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
+        ends, weights = (problem.start, problem.goal), (own_weights, cost.collision_weight)
+        task = kernels.LineTask(*ends, problem.arms, *weights, *envelope)
         found = kernels.Evaluated.room(robots, count)
         # paths, and C2 … C4 (Eqs. 6–8)
         shape, is_lines = (robots, self.num_configurations + 2), collision.is_lines

@@ -134,7 +134,6 @@ class Search(GeneticSearch):
     end: BestEnd  # of the present search
 
     def __init__(self, planner: "RedundantGa", problem: Problem, rng: np.random.Generator) -> None:
-        """Take memory."""
         ga, limits = planner.ga, problem.joint_limits
         assert isinstance(ga, RealGenetic | BinaryGenetic), "prepare refuses others"
         size, bits = ga.population_size, ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 0

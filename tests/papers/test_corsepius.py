@@ -84,7 +84,7 @@ def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     bodies, covers = (table[table["element"] == kind] for kind in ("body", "cover"))
     problem = condition.prepared.problem
     assert list(bodies["name"]) == list(problem.bodies.names)
-    assert len(covers) == len(problem.bodies.shapes.joint)
+    assert len(covers) == problem.bodies.num_shapes
     inner, outer = trails.corners(bodies), trails.corners(covers)
     assert (inner.min(axis=0) >= outer.min(axis=0) - 1e-9).all()
     assert (inner.max(axis=0) <= outer.max(axis=0) + 1e-9).all()

@@ -205,7 +205,7 @@ needs_robots = pytest.mark.skipif(
 def test_a_reach_is_planned_and_certified(robot: GalleryRobot) -> None:
     found = planned_reach(robot)
     _, problem = found.reach.postures.prepare()
-    assert len(problem.bodies.shapes.joint) > 0
+    assert problem.bodies.num_shapes > 0
     assert found.postures is not None
     assert found.strings is not None
 

@@ -213,7 +213,7 @@ class BodyModel(NamedTuple):
         meshes = any(isinstance(item.geometry, coal.BVHModelBase) for item in items)
         beyond = "them, or the convex hulls of meshes" if meshes else "them"
         lines = [
-            f"{len(names)} bodies covered by {len(self.shapes.joint)} spheres and capsules, which "
+            f"{len(names)} bodies covered by {self.num_shapes} spheres and capsules, which "
             f"reach at most {self.inflation:.3g} {unit} beyond {beyond}"
         ]
         named, most = list(zip(names, self.covers, strict=True)), self.asked * (1.0 + 1e-6)
@@ -249,6 +249,11 @@ class BodyModel(NamedTuple):
         return lines + _listed(
             {f"covers touch at {where}, left to the certifier": pairs.fitted}, names
         )
+
+    @property
+    def num_shapes(self) -> int:
+        """Spheres and capsules of all bodies."""
+        return len(self.shapes.joint)
 
     def collision(
         self,

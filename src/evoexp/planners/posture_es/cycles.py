@@ -7,7 +7,6 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part
-from evoexp.evolution.succession import cost_statistics
 from evoexp.numeric.elementary import standard_normal
 from evoexp.objectives.posture_cost import COLUMNS
 from evoexp.paths.motion import Motion
@@ -217,13 +216,12 @@ class Search:
         self._keeper.keep(self._least if last else np.inf, best)
         costs, count = self._costs, self._offspring.shape[1]
         return self._keeper.record(
-            cost_statistics(self._usable),
-            costs[None, :] if num_phases > 1 else costs,
+            self._usable,
             self._offspring,
-            lowest=float(costs.min()) if last else np.inf,
-            num_feasible=int(np.count_nonzero(np.isfinite(self._usable))),
+            count * (1 + (self._planner.edge_check if self._cycles else 0)),
             evaluations=count,
-            collision_queries=count * (1 + (self._planner.edge_check if self._cycles else 0)),
+            costs=costs[None, None] if num_phases > 1 else costs[None],
+            lowest=[float(costs.min()) if last else np.inf],
             stop_reason=reason if last or reason != "goal" else "",
         )
 

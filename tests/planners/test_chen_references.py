@@ -1,4 +1,4 @@
-"""The compiled planners of Chen & Zalzala against the same algorithms in plain Python, and verdicts.
+"""The compiled planners of Chen & Zalzala against the same algorithms in plain Python; postures.
 
 Both take the same uniform numbers, so paths and strings of bits are equal, and costs differ by
 rounding alone.
@@ -152,12 +152,8 @@ def test_postures_do_not_depend_on_how_numbers_and_generations_are_made_in_block
     assert same_postures(planner.model_copy(update={"ga": ga}), problem, 3)
 
 
-def placement(*words: str) -> Any:
-    return composed("experiment=chen_placement", *words, label="A torque norm").prepare()
-
-
 def test_postures_are_judged_by_their_bodies() -> None:
-    planner, problem = placement("scenario=chen_docking_link", "objective=chen_obstacle_link")
+    planner, problem = prepared("scenario=chen_docking_link", "objective=chen_obstacle_link")
     assert planner.motion(problem, np.array([68.96, 41.74])).q.shape == (2, 4)
     refuted = verdict(planner, problem, np.array([68.96, 41.74]))
     assert refuted.certified is False
@@ -166,7 +162,7 @@ def test_postures_are_judged_by_their_bodies() -> None:
 
 
 def test_an_infeasible_posture_is_told_as_such() -> None:
-    planner, problem = placement()
+    planner, problem = prepared()
     terms = planner.evaluate(problem, np.array([0.0, -90.0]))
     assert [terms[name] for name in ("branch", "cost", "other_cost")] == [-1.0, 250.0, 250.0]
     assert np.isnan(terms["theta_3_deg"])

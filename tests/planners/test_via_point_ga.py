@@ -115,12 +115,11 @@ def test_without_a_margin_of_their_own_obstacles_have_that_of_the_arms() -> None
     assert "obstacle_margin" not in given.to_json().decode()
 
 
-# The compiled planner of Rana & Zalzala against the same algorithm in plain numpy and scipy.
-#
-# Both take the same uniform numbers. As long as both take the same discrete decisions (who is drawn,
-# which sites, who collides), a generation differs by no more than the arithmetic. A decision flips
-# only if a number comes closer to its threshold than that, which with the seeds below never happens;
-# were one to flip, the strings would differ by degrees and the test would fail.
+# Against the same algorithm in plain numpy and scipy. Both take the same uniform numbers; as long
+# as both take the same discrete decisions (who is drawn, which sites, who collides), a generation
+# differs by no more than the arithmetic. A decision flips only if a number comes closer to its
+# threshold than that, which with the seeds below never happens; were one to flip, the strings would
+# differ by degrees and the test would fail.
 
 ROUNDING = 1e-9  # [deg] measured: 7e-13
 
@@ -131,10 +130,6 @@ ARC_LENGTH = {128: 3e-3, 1024: 6e-5}  # [deg]
 PLANAR, THREE = "rana_planar", "rana_three_arms"
 
 
-def compared(words: str, *more: str) -> Condition:
-    return composed(*f"experiment={words}".split(), *more)
-
-
 def largest_difference(given: Condition, seed: int, **changes: Any) -> float:
     """Return the largest difference of strings [deg] or costs over all generations.
 
@@ -143,7 +138,7 @@ def largest_difference(given: Condition, seed: int, **changes: Any) -> float:
     planner, problem = given.prepare()
     size = planner.ga.population_size
     ours = generations(planner.evolve(problem, np.random.default_rng(seed)))
-    slow = rana_numpy.from_compared(given, **changes)
+    slow = rana_numpy.from_condition(given, **changes)
     theirs = rana_numpy.evolve(slow, np.random.default_rng(seed))
     largest, hits = 0.0, 0
     for generation, expected in zip(ours, theirs, strict=True):
@@ -172,7 +167,8 @@ def largest_difference(given: Condition, seed: int, **changes: Any) -> float:
 def test_generations_agree_to_the_accuracy_of_the_arc_length(
     words: str, chords: int, samples: int
 ) -> None:
-    given = compared(words, f"planner.samples_per_segment={samples}", "ga.num_generations=3")
+    words += f" planner.samples_per_segment={samples} ga.num_generations=3"
+    given = composed(*f"experiment={words}".split())
     for seed in (0, 1):
         difference = largest_difference(given, seed, chords_per_segment=chords)
         assert difference < ARC_LENGTH[chords]
@@ -193,7 +189,8 @@ def test_generations_agree_to_the_accuracy_of_the_arc_length(
     ],
 )
 def test_without_redistribution_generations_agree_to_rounding(words: str) -> None:
-    given = compared(words, "planner.redistribution=false", "ga.num_generations=40")
+    words += " planner.redistribution=false ga.num_generations=40"
+    given = composed(*f"experiment={words}".split())
     for seed in (0, 1):
         assert largest_difference(given, seed) < ROUNDING
 
@@ -207,7 +204,7 @@ def test_generations_are_starts_and_sweeps_as_a_slow_version_makes_them(
     own = f"planner.redistribution={redistribution}"
     given = composed("experiment=rana_planar", "control=multi_start", *words, own)
     alone = given._replace(planner=given.planner.planner)
-    slow = rana_numpy.from_compared(alone, chords_per_segment=512)
+    slow = rana_numpy.from_condition(alone, chords_per_segment=512)
     rng, lowest = np.random.default_rng(3), np.inf
     for k, generation in enumerate(ran(given, 3).records):
         if k % 3 == 0:

@@ -3,7 +3,7 @@
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -207,10 +207,6 @@ def test_a_killed_or_slow_worker_costs_its_own_replicate_a_retry(
 # Tasks
 
 
-def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
-    return [Outcome(job.condition_id, job.replicate, "", "", b"", wall_s) for job in jobs]
-
-
 @given(
     st.integers(0, 300),
     st.integers(2, 8),
@@ -226,8 +222,10 @@ def test_every_job_is_run_once_and_in_order(
         share = -(-(num_jobs - len(seen)) // (2 * num_workers))  # nobody waits for one worker
         assert 1 <= len(bundle) <= min(MAX_BUNDLE, max(1, share))
         wall, done = tasks[count % len(tasks)]
-        seen += bundle[:done]  # the worker stopped there
-        replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
+        own = bundle[:done]  # the worker stopped there
+        seen += own
+        outcomes = [Outcome(job.condition_id, job.replicate, "", "", b"", wall) for job in own]
+        replicates.end_task((bundle,), outcomes)
     assert seen == waiting
 
 

@@ -20,7 +20,7 @@ from rich.console import Console
 import evoexp.batch.jobs as jobs_module
 from evoexp import load
 from evoexp.batch.jobs import NUM_POINTS, CurveFile, Outcome, read_curves
-from evoexp.commands.run import MOST_ROWS, BatchProgress, drawn
+from evoexp.commands.batch_progress import MOST_ROWS, BatchProgress, drawn
 from evoexp.configuration import compose
 from evoexp.records import Block, Generation
 from evoexp.store.run_directory import RunDirectory
@@ -82,11 +82,11 @@ def test_conditions_that_become_one_are_one_row_everywhere(
 def test_terminal_and_report_have_all_stored_replicates(evoexp: Evoexp, stored: Path) -> None:
     said = evoexp("run", *PLANAR, "num_replicates=1", "report=paper", *DRAFT)
     assert said.out.count("2 of 2") == 3
-    assert "of 1 asked for: all that are stored, here and in the report" in said.out
+    assert "asked for: 1 of each; more are stored, and all count, here" in said.out
     (page,) = (stored / "reports").glob("*/index.md")
     assert "| `num_replicates` | 2 |" in page.read_text()
     said = evoexp("run", *PLANAR, "--no-report")
-    assert "asked for: all" not in said.out
+    assert "asked for: " not in said.out
 
 
 def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:

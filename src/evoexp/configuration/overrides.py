@@ -158,6 +158,19 @@ def refuse_equal_values(overrides: Choice) -> None:
             raise SettingError(key, "values that differ", override.typed)
 
 
+def search_space(overrides: Choice) -> Choice:
+    """Return the overrides that a search chooses values of; none without `sweep=…`."""
+    if SWEEP not in overrides or overrides[SWEEP].option() is None:
+        return {}
+    swept = {key: override for key, override in overrides.items() if override.is_swept}
+    space = {key: override for key, override in swept.items() if override.root in SEARCHED}
+    if not space:
+        must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
+        raise SettingError(SWEEP, must, " ".join(each.text for each in swept.values()))
+    refuse_equal_values(space)
+    return space
+
+
 def single_values(override: Override) -> Iterator[Override]:
     """Yield an override with each of its values."""
     if not override.values:

@@ -232,7 +232,7 @@ class Search:
         }
 
     def found(self) -> Searched:
-        """Return what is known so far."""
+        """Return the trials found so far, with the importance of settings."""
         first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
         found = self._searched((first, *(trial for trial, _ in self.stored)))
         refused = {

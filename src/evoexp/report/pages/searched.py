@@ -70,7 +70,9 @@ def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[
         )
 
 
-def best_trial_by_problem(best_trial: Trial, search_scores: pd.DataFrame) -> Iterator[tuple[object, ...]]:
+def best_trial_by_problem(
+    best_trial: Trial, search_scores: pd.DataFrame
+) -> Iterator[tuple[object, ...]]:
     """Yield a row per problem: the experiment as it is beside the best trial."""
     of_trial = search_scores["trial"]
     own, best = (search_scores[of_trial == number] for number in (0, best_trial.number))

@@ -23,7 +23,7 @@ class Trial(NamedTuple):
 
 
 class Searched(NamedTuple):
-    """What a search has found so far."""
+    """The trials of a search so far."""
 
     problems: tuple[str, ...]  # labels of the conditions that have the searched settings
     trials: tuple[Trial, ...]  # finished ones, trial 0 first

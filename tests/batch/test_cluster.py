@@ -13,7 +13,7 @@ from batch_samples import around_plug_in, digests, failures, new_batch, run
 from process_table import eventually
 
 from evoexp import shipped
-from evoexp.batch import jobs
+from evoexp.batch import cluster
 from evoexp.condition import Condition
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
@@ -88,7 +88,7 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(
         next(outcomes)
         local.sync(local.scheduler.close)
         must = r"^runner\.address: the scheduler at tcp://.* went away; finished replicates"
-        with pytest.raises(jobs.ClusterError, match=must):
+        with pytest.raises(cluster.ClusterError, match=must):
             list(outcomes)
     assert RunDirectory(tmp_path / "outputs", faulty.id).completed()
 
@@ -97,9 +97,9 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(
 def test_a_worker_with_other_code_is_refused(
     faulty: Condition, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(jobs, "code_identity", lambda: "0.0.1 (abc)")
+    monkeypatch.setattr(cluster, "code_identity", lambda: "0.0.1 (abc)")
     must = r"^runner\.address: the worker on .* must have evoexp 0\.0\.1 \(abc\), has "
-    with pytest.raises(jobs.ClusterError, match=must):
+    with pytest.raises(cluster.ClusterError, match=must):
         run(tmp_path / "outputs", (faulty, 3), backend="dask", address=scheduler)
 
 
@@ -108,7 +108,7 @@ def test_an_address_that_nobody_answers_is_refused(faulty: Condition, tmp_path: 
 
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
-        pytest.raises(jobs.ClusterError, match="must be the address of a scheduler that answ"),
+        pytest.raises(cluster.ClusterError, match="must be the address of a scheduler that answ"),
     ):
         run(tmp_path / "outputs", (faulty, 3), backend="dask", address="tcp://127.0.0.1:1")
 

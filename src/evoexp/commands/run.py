@@ -37,6 +37,7 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
   evoexp list                                       # all {number} experiments, and stored runs"""
+ADDRESS = "runner.address="  # of a machine: no stored command tells it
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
 PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
 MOST_ROWS = 12  # conditions on the screen: those that a replicate ended of last
@@ -61,7 +62,8 @@ def main(arguments: argparse.Namespace) -> int:
     )
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    command = shlex.join(["evoexp", "run", *arguments.overrides, *option_words(arguments)])
+    typed = [word for word in arguments.overrides if not word.startswith(ADDRESS)]
+    command = shlex.join(["evoexp", "run", *typed, *option_words(arguments)])
     wanted = [
         (each, each.num_replicates(experiment.num_replicates), experiment.origin(label, command))
         for experiment in experiments

@@ -147,6 +147,7 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
     assert failure["reason"] == read_summaries(directory)["stop_reason"][1] == REASON.format(1)
     assert failure["traceback"].startswith("Traceback (most recent call last):\n")
     assert failure["traceback"].endswith("to fail\nand says why\n")
+    assert '\n  File "evoexp/batch/jobs.py", line ' in failure["traceback"]  # of no machine
     assert read_summaries(directory)["status"].tolist() == ["done", "failed", "done"]
     assert "1 replicate failed before" in " ".join(said(1, "--no-report")[0].split())
     assert main(["list", "--failed"]) == 0

@@ -57,7 +57,9 @@ def cluster_fan_out(
     except ImportError:
         must = "runner=dask needs distributed: pip install 'evoexp[cluster]'"
         raise ClusterError(must) from None
-    # a lost scheduler is told below, in one line
+    kept = "finished replicates are kept, the same command runs the others"
+    lost = distributed.CancelledError, distributed.comm.core.CommClosedError, ImportError
+    # either is told below, in one line
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     with _client(distributed, settings) as client:
         workers, replicates = ClusterWorkers(client, limits), Replicates(jobs, 1, limits)
@@ -80,15 +82,12 @@ def cluster_fan_out(
                 end = future.result()
             except distributed.scheduler.KilledWorker:
                 end = Died(0.0)  # the scheduler does not tell when it began
-            except (ModuleNotFoundError, AttributeError, distributed.CancelledError) as error:
+            except lost as error:
                 reason = printable(str(error).splitlines()[0])
-                if "scheduler-" in reason:  # connection-lost, restart
-                    raise ClusterError(
-                        f"runner.address: the scheduler at {workers.address} went away; "
-                        "finished replicates are kept, the same command runs the others"
-                    ) from None
-                must = f"runner.address: a worker cannot run evoexp: {reason}"
-                raise ClusterError(must) from None
+                must = f"a worker cannot run evoexp: {reason}"
+                if isinstance(error, OSError) or "scheduler-" in reason:  # connection-lost, restart
+                    must = f"the scheduler at {workers.address} went away; {kept}"
+                raise ClusterError(f"runner.address: {must}") from None
             finally:
                 future.release()
             if outcomes := replicates.end_task(sent.pop(future.key), end):
@@ -110,9 +109,10 @@ class ClusterWorkers:
         if now - self._counted_at >= COUNT_S:
             self._counted_at = now
             with contextlib.suppress(OSError):  # the scheduler went away: the tasks tell
-                workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
-                self._number = len(workers)
-                self._say(sum(not worker["nanny"] for worker in workers), now)
+                # what `client.scheduler_info` returns may hold no workers: it is also set meanwhile
+                info = self._client.sync(self._client.scheduler.identity, n_workers=-1)
+                self._number = len(info["workers"])
+                self._say(sum(not worker["nanny"] for worker in info["workers"].values()), now)
         return self._number
 
     def _say(self, num_alone: int, now: float) -> None:

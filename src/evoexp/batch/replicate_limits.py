@@ -71,9 +71,11 @@ def _in_time(limits: ReplicateLimits, in_worker: bool) -> Iterator[None]:
     with open(os.devnull, "w") as nowhere:
         if in_worker:  # a thread of C, which needs nothing of the interpreter
             faulthandler.dump_traceback_later(seconds + GRACE_S, exit=True, file=nowhere)
-        before = signal.signal(signal.SIGALRM, tell) if is_main else timer.start()
         if is_main:
+            before = signal.signal(signal.SIGALRM, tell)
             signal.setitimer(signal.ITIMER_REAL, seconds)
+        else:
+            timer.start()
         try:
             yield
         finally:

@@ -17,15 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from evoexp.batch.jobs import (
-    NO_LIMITS,
-    Job,
-    Outcome,
-    Replicates,
-    one_of_each_kind,
-    run_jobs,
-    warm_kernels,
-)
+from evoexp.batch.jobs import Job, Outcome, Replicates, one_of_each_kind, run_jobs, warm_kernels
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import Died
@@ -45,7 +37,7 @@ class ClusterError(EvoexpError):
 
 
 def cluster_fan_out(
-    jobs: Sequence[Job], settings: RunnerSettings, limits: ReplicateLimits = NO_LIMITS
+    jobs: Sequence[Job], settings: RunnerSettings, limits: ReplicateLimits
 ) -> Iterator[list[Outcome]]:
     """Run jobs on a cluster; yield outcomes as they come.
 

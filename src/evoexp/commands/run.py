@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
   evoexp list                                       # all {number} experiments, and stored runs"""
+ADDRESS = "runner.address="  # of a machine: no stored command tells it
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
 
 
@@ -101,6 +102,10 @@ class Runs:
         Not `told`, it leaves no line behind.
         """
         again = option_words(self._arguments)
+        asked = [
+            (each, [word for word in overrides if not word.startswith(ADDRESS)])
+            for each, overrides in asked
+        ]
         wanted = [
             (
                 each,

@@ -239,9 +239,12 @@ def _stamps(roots: Iterable[Path]) -> str:
 def summary_table(experiment: Experiment) -> Table:
     """Return a table of the conditions: replicates done, solved, certified, cost and time.
 
-    As the report, it has all stored replicates, also those beyond the number that is asked for.
+    As the report, it has all stored replicates, also those beyond the number that is asked for. Of
+    a search it has the experiment as it is and the best trial.
     """
     rows, caption = [], None
+    if experiment.search is not None:
+        experiment = experiment.of(experiment.search.best_conditions)
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
         asked = condition.num_replicates(experiment.num_replicates)

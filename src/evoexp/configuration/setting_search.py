@@ -231,6 +231,12 @@ class Search:
             if known.setdefault(built.condition.id, label) == label
         }
 
+    @property
+    def best_conditions(self) -> dict[str, Built]:
+        """The conditions of the problems and of the stored trial of the least score, by label."""
+        scores = [trial.value for trial in self._finished() if trial.value is not None]
+        return self.base | (self.stored[scores.index(min(scores))][1] if self.stored else {})
+
     def found(self) -> Searched:
         """Return the trials found so far, with the importance of settings."""
         first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))

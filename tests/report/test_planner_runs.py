@@ -185,7 +185,7 @@ def test_planners_of_several_problems_are_named_by_their_components(
     page = comparison.page(gather(stored, conditions, None, "", "", ""), settings)
     assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "targets_by_problem"]
     headings = [table.heading for table in page.tables]  # no problem has all planners
-    assert headings == ["Problems", "Answers", "The same in other coins"]
+    assert headings == ["Problems", "Answers", "Other measures of effort and cost"]
     planners = set(page.drawings[0].table()["planner"])
     assert all(p.startswith(("via_point_ga", "random_search", "multi_start")) for p in planners)
 

@@ -150,7 +150,7 @@ def test_spheres_of_others_stand_where_their_file_has_them(tmp_path: Path) -> No
     # other links are covered as asked
     assert other.uncovered == 0.0 < cover.uncovered
     notes = " | ".join(condition.planner.notes(problem))
-    assert "given spheres do not contain all bodies; standing out [m]: " in notes
+    assert "given spheres do not contain all bodies; uncovered [m]: " in notes
     assert "forearm_link 0." in notes
 
 

@@ -46,8 +46,8 @@ CURVE_WIDTH = 16  # characters of a curve
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
 UNSOLVED = "x"
 LIVE_NOTE = (
-    "convergence: best cost so far of the replicate heard last, from its first generation to the "
-    f"one shown, each between its own extremes; {UNSOLVED}: nothing solved yet"
+    "convergence: best cost so far of the replicate that reported last, from its first generation "
+    f"to the one shown, scaled to its own range; {UNSOLVED}: nothing solved yet"
 )
 
 
@@ -98,7 +98,7 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
         if what:
             say(f"skipped: {label}: {what}")
     if all(lacks.values()):
-        raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
+        raise SettingError("planner", f"installed: {next(iter(lacks.values()))}", "missing")
     return [each for each in experiment.conditions if not lacks[each.label]]
 
 
@@ -109,7 +109,7 @@ def _run(
         if batch.is_damaged:
             deque(batch.run(), maxlen=0)  # mends what is no replicate
         if not batch.num_left_failed:
-            say("nothing to run: every replicate is there")
+            say("nothing to run: every replicate is stored")
         return []
     planned = sorted({count for _, count, _ in wanted})
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
@@ -144,7 +144,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
         directory = outputs_root() / "reports" / experiment.report_name
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
-            return f"{directory / 'index.html'} (as it was)"
+            return f"{directory / 'index.html'} (unchanged)"
         from evoexp.commands.report import request_of  # pandas, where there is no need
 
         page = request_of(experiment, *asked).write(outputs_root())
@@ -183,10 +183,10 @@ def summary_table(experiment: Experiment) -> Table:
         named = {"experiment": "", "label": label, "budget": "", "changed": False}
         rows.append(run_row(run.hash12, run) | named | {"planned": run.num_planned(asked)})
         if experiment.budget_of(label) == "smoke":
-            caption = "budget=smoke shows that everything runs; its numbers decide nothing"
+            caption = "budget=smoke checks that everything runs; nothing can be concluded from it"
         if rows[-1]["planned"] > asked:
-            all_of = "all that are stored, here and in the report"
-            caption = f"of {experiment.num_replicates} asked for: {all_of}"
+            number = f"{experiment.num_replicates} requested"
+            caption = f"all stored replicates, here and in the report; {number}"
     table = run_table(experiment.report_name, rows)
     table.caption = caption
     return table

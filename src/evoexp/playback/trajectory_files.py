@@ -60,7 +60,7 @@ def read_columns(content: bytes) -> JointTrajectory:
     head = rows[0].cells if rows else []
     for name in head:
         if head.count(name) > 1 or not name or NUMBER.fullmatch(name):
-            raise TableError(rows[0].line, "a head with a name per column, each once", name)
+            raise TableError(rows[0].line, "a header with a different name per column", name)
     for line, cells in rows[1:]:
         for name, cell in zip(head, cells, strict=True):
             if not NUMBER.fullmatch(cell):

@@ -307,7 +307,7 @@ def best_walk(
             costs[count] = costs_at(count, count)[count]
             least = min(least, costs[count])
     if not np.isfinite(costs.min()):
-        must = "as many as a path from start to goal has"
+        must = "at least the number of nodes from start to goal"
         raise SettingError("reference.max_nodes", must, max_nodes)
     best = int(costs.argmin())
     _, walk = best_walks(arrivals, lam / best * arrivals.unsafeness, best)

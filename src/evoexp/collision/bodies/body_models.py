@@ -223,13 +223,13 @@ class BodyModel(NamedTuple):
         named, most = list(zip(names, self.covers, strict=True)), self.asked * (1.0 + 1e-6)
         if out := [f"{name} {c.uncovered:.3g}" for name, c in named if c.uncovered > 0.0]:
             sizes = ", ".join(out)
-            lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {sizes}")
+            lines.append(f"given spheres do not contain all bodies; uncovered [{unit}]: {sizes}")
         if wide := [f"{name} {c.inflation:.3g}" for name, c in named if c.inflation > most]:
             sizes = ", ".join(wide)
             if self.assembly.frames is not None:  # out of a URDF
                 sizes += "; robot.decomposition or robot.spheres bring closer ones"
-            must = f"the {self.asked:g} {unit} asked for"
-            lines.append(f"covers that reach farther than {must}: {sizes}")
+            must = f"the requested {self.asked:g} {unit}"
+            lines.append(f"covers that reach beyond {must}: {sizes}")
         # pairs of bodies, and covers made smaller
         pairs, where = self.sorted_pairs, "the start or the goal"
         unjudged = {

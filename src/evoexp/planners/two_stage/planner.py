@@ -59,7 +59,7 @@ class TwoStage(PlannerDefaults, Component):
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
         """Prepare both stages."""
         if len(scenario.grid.size) != 2:
-            must = "of a floor, two numbers"
+            must = "two numbers, the size of a floor"
             raise SettingError("scenario.grid.size", must, list(scenario.grid.size))
         placement = self.placement.prepare(robot.arm(), scenario.docking)
         path = self._driving.prepare(robot.platform(), scenario.grid)

@@ -153,7 +153,7 @@ def _outcomes(label: str, rows: Sequence[Comparison], significance: float) -> st
     words = {
         1: "is significantly better than",
         -1: "is significantly worse than",
-        0: "cannot be told from",
+        0: "does not differ significantly from",
     }
     parts = []
     for sign, word in words.items():

@@ -161,6 +161,6 @@ def test_a_goal_for_a_joint_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_pairs_whose_covers_always_touch_are_named(shipped: dict[str, Condition]) -> None:
     planner, problem = shipped["box_ur5"].prepare()
-    (line,) = (line for line in planner.notes(problem) if "in every posture sampled" in line)
+    (line,) = (line for line in planner.notes(problem) if "in every sampled posture" in line)
     assert "tested by maps of exact distances" in line
     assert "forearm_link with wrist_2_link" in line

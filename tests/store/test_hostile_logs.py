@@ -91,7 +91,7 @@ def zeros(size: int) -> bytes:
 def test_a_chunk_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     (parts, chunk), size = opened(), 3 * 10**9
     chunk.frame = zeros(size)
-    for told, reason in ((size, "at most"), (1000, "size that it tells")):
+    for told, reason in ((size, "at most"), (1000, "size that it states")):
         chunk.size = told
         bomb = anatomy.put_together(parts)
         assert len(bomb) < 150_000

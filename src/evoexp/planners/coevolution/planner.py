@@ -84,7 +84,7 @@ def length_notes(
         notes += [
             f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "
             f"(printed: {PRINTED_STEPS[0]:g} and {PRINTED_STEPS[1]:g})",
-            f"robot {r + 1}: Eq. 3 asks for L = {asked} here ({turn:g} deg), for L = {worst} over "
+            f"robot {r + 1}: Eq. 3 requires L = {asked} here ({turn:g} deg), L = {worst} over "
             f"{HALF_TURN_DEG:g} deg (printed: {PRINTED_LENGTH})",
             f"robot {r + 1}: L = {chromosome_length} (K = {segments - 1}) takes steps of "
             f"{step:.2f} deg at best, which {verdict}",

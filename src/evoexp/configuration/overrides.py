@@ -79,7 +79,7 @@ Choice = Mapping[str, Override]  # by key, each with one value
 
 
 def collect(overrides: Iterable[Override]) -> dict[str, Override]:
-    """Return overrides by key, after refusing those that no configuration can take."""
+    """Return overrides by key, after refusing overrides that no configuration can take."""
     found: dict[str, Override] = {}
     for override in overrides:
         known = found.setdefault(override.key, override)

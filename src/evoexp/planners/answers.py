@@ -25,9 +25,9 @@ KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave 
 Acceptance = Literal["model", "certified", "margin"]
 """Motions that a search accepts.
 
-`model`: those that its collision model accepts at the instants it tests; `certified`: those of them
-that the exact certifier proves free of contact between all instants; `margin`: or by the task's
-margins.
+`model`: its collision model accepts the motion at the instants it tests; `certified`: the exact
+certifier also proves the motion free of contact between all instants; `margin`: the proof includes
+the task's margins.
 """
 
 
@@ -36,7 +36,7 @@ class JudgementArrays(NamedTuple):
 
     cost: FloatArray  # (individuals,) lower is better; inf: infeasible
     feasible: BoolArray  # (individuals,) whether the planner's own model accepts each
-    collision_queries: int  # configurations asked for, also those that the kernels skip
+    collision_queries: int  # configurations queried, those skipped by kernels included
     terms: Mapping[str, NDArray[Any]]  # name → (individuals,) of the planner's own terms
 
     def named_terms(self, individual: int) -> dict[str, float]:

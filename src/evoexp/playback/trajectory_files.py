@@ -1,4 +1,4 @@
-"""Joint trajectories out of files: those that `export` writes, and those of others.
+"""Joint trajectories out of files, written by `export` or by others.
 
 CSV with a column per joint (`elbow_rad`, `elbow [deg]`, `elbow`), or a
 `trajectory_msgs/msg/JointTrajectory` in JSON or YAML. Joints are matched by name, in any order; a

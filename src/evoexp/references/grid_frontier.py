@@ -63,7 +63,7 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
     """Return the permitted moves by their ends; see `best_walk`."""
     order = np.argsort(network.heads, kind="stable")
     heads, count = network.heads[order], len(network.unsafeness)
-    # place of each move among those that end at the same node
+    # place of each move among the moves that end at the same node
     rank = np.arange(len(heads)) - np.searchsorted(heads, heads)
     moves = int(rank.max()) + 1
     tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)

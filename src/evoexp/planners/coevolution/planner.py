@@ -121,9 +121,9 @@ class Coevolution(PlannerDefaults, Component):
     ga: CoevolutionSettings  # populations, generations, rates, hall of fame
     objective: MotionCriteria  # weights of C1 … C4
     collision: LinkCrossings  # links as lines, or their envelopes
-    # which teams are an answer: those that the model accepts at the configurations it tests,
-    # or those of them whose motion the exact certifier proves; robots of one that is refuted
-    # count as colliding once more
+    # which teams are an answer: all that the model accepts at the configurations it tests, or
+    # only teams whose motion the exact certifier also proves; robots of a refuted team count
+    # as colliding once more
     acceptance: Acceptance = "model"
 
     @model_validator(mode="after")

@@ -51,9 +51,9 @@ class TwoStage(PlannerDefaults, Component):
 
     placement: PlacementGa  # the planner of the first stage
     path: GridPathGa  # the planner of the second one
-    # which missions are an answer: those that both stages accept (`model`), or those of them
-    # whose whole motion, driving and docking, the exact certifier proves (`certified`,
-    # `margin`). Moves over the grid that it refutes are forbidden then
+    # which missions are an answer: all that both stages accept (`model`), or only missions
+    # whose whole motion, driving and docking, the exact certifier also proves (`certified`,
+    # `margin`). Refuted moves over the grid are then forbidden
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:

@@ -347,8 +347,8 @@ def hull_notes(names: Sequence[str]) -> tuple[str, ...]:
     """Note which obstacles a search takes to be larger than they are."""
     if not names:
         return ()
-    note = "meshes, cones and hulls: the search tests the boxes around them, the verdict is of the"
-    return (f"{note} convex hulls: {', '.join(names)}",)
+    note = "meshes, cones and hulls: the search tests boxes around them, the verdict"
+    return (f"{note} judges their convex hulls: {', '.join(names)}",)
 
 
 def _typed(assembly: Assembly, q: FloatArray) -> FloatArray:

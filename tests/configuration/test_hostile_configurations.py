@@ -115,8 +115,8 @@ HOSTILE = {
     "code": ("x: !!python/object/apply:os.system ['touch harm']\n", "not determine a constructor"),
     "code by name": ("_target_: os.system\ncommand: touch harm\n", "a registered component"),
     "the environment": (f"{GA}x: ${{oc.env:SECRET}}\n", "functions such as oc.env are not allowed"),
-    "the environment in words": (f"{GA}x: a${{oc.env:SECRET}}b\n", "no function"),
-    "a function of it": (f"{GA}x: ${{oc.decode:${{oc.env:SECRET}}}}\n", "no function"),
+    "the environment in words": (f"{GA}x: a${{oc.env:SECRET}}b\n", "functions such as oc.env"),
+    "a function of it": (f"{GA}x: ${{oc.decode:${{oc.env:SECRET}}}}\n", "functions such as oc.env"),
     "a device": ("/dev/zero", "no option 'mine'"),
 }
 

@@ -249,7 +249,7 @@ def _summary(log: CheckedLog, place: Place | None) -> ReplicateSummary:
 def read_log(source: Source, place: Place | None = None) -> LogContents:
     """Return everything that a log holds, verified.
 
-    CorruptLog is raised if it is damaged, or does not belong to the given place.
+    CorruptLog is raised where it is damaged, or does not belong to a place that is given.
     """
     with _opened(source) as log:
         rows: dict[str, list[Any]] = {topic: [] for topic in _RECORDS}

@@ -11,7 +11,7 @@ from evoexp.validation import Count
 
 
 class RandomSearch(WrappedPlanner):
-    """Draws individuals as the wrapped planner draws its first ones, one per evaluation."""
+    """Draws individuals as the wrapped planner draws its first ones, as many as it evaluates."""
 
     component: ClassVar[str] = "random_search"
 

@@ -143,7 +143,7 @@ def _notices(results: Results) -> Iterator[tuple[str, str]]:
         yield "Damaged logs", text
     if added:
         text = (
-            f"{'; '.join(added)}: requested after results of earlier ones were stored. "
+            f"{'; '.join(added)}: asked for when results of earlier ones were stored already. "
             "Numbers and verdicts below use all of them."
         )
         yield "Replicates added later", text

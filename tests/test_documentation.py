@@ -1,5 +1,6 @@
 """Documentation: links lead somewhere, commands and code run as they stand, pages are in a menu."""
 
+import ast
 import contextlib
 import functools
 import json
@@ -7,7 +8,9 @@ import re
 import shlex
 import shutil
 from collections.abc import Iterator
+from inspect import ismodule
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import NamedTuple
 
 import duckdb
@@ -271,3 +274,46 @@ def test_verdicts_of_a_paper_are_those_that_are_stored(paper: str) -> None:
     assert page == update.with_table(page, stored), "run: scripts/update-verdicts"
     claims = registered_rules(registered(CLAIMS, paper))
     assert stored and {row["name"] for row in stored} <= {*claims}, "run: scripts/update-verdicts"
+
+
+def test_figures_of_the_architecture_are_those_of_the_imports(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    update = script("update-architecture")
+    stored = {path.name: path.read_text(encoding="utf-8") for path in update.FIGURES.iterdir()}
+    assert update.figures() == stored, "run: scripts/update-architecture"
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    assert all(f"| `{path.parent.name}` |" in page for path in update.SOURCE.glob("*/__init__.py"))
+    wrong = update.Station(0, "cli.py", ""), update.Station(1, "condition.py", "", "Batch")
+    monkeypatch.setattr(update, "WAYS", {"log": wrong})
+    assert update.main([]) == 2
+    must = "error: log: cli.py must import Batch from condition.py, imports nothing\n"
+    assert capsys.readouterr().err == must
+
+
+def imported(code: str) -> Iterator[str]:
+    """Yield the names of evoexp that code imports; of a module that it imports those it uses."""
+    for node in ast.walk(ast.parse(code)):
+        module = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+        for alias in node.names if isinstance(node, ast.Import | ast.ImportFrom) else ():
+            if (name := f"{module}{alias.name}").split(".")[0] == "evoexp":
+                members = re.findall(rf"\b{alias.name}\.(\w+)", code)
+                is_module = ismodule(resolve_name(name))
+                yield from (f"{name}.{member}" for member in members) if is_module else [name]
+
+
+def test_api_pages_name_what_guests_use_and_nothing_else() -> None:
+    code = [path.read_text() for path in ROOT.glob("src/evoexp/assets/new_*/**/*.py")]
+    code += [block.text for page in PAGES for block in blocks(page, "python")]
+    cells = json.loads(NOTEBOOK.read_text())["cells"]
+    code += ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    used = {id(resolve_name(name)): name for text in code for name in imported(text)}
+    pages = "".join(page.read_text() for page in PAGES if page.name != "changelog.md")
+    shown = re.findall(r"^::: (\S+)(?:\n +options: {members: \[(\w+)\]})?", pages, re.MULTILINE)
+    entries = [f"{n}.{m}" if ismodule(resolve_name(n)) else n for n, m in shown]
+    objects = {id(resolve_name(name)): name for name in entries}
+    assert [name for key, name in used.items() if key not in objects] == []
+    # a page says what the others are for
+    named = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", pages))))
+    others = [objects[key].split(".")[-1] for key in objects.keys() - used.keys()]
+    assert [name for name in others if name not in named] == []

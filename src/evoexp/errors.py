@@ -5,12 +5,16 @@ error is none of these: it keeps its traceback.
 """
 
 import difflib
+import os
+import re
+import sys
 from collections.abc import Iterable, Sequence
 
 _SHOWN = 200  # [-] characters of a value in a message
 _LONGEST = 1200  # [-] characters of any other text in it, such as a list of names
 _MOST_NAMES = 12  # [-] names that a message lists; of more it lists the nearest
 _NEAREST = 5  # [-] names listed then
+_FOLDERS = re.compile(r"(?<![\w.:/~-])/(?:[^\s/:'\"]+/)+")  # of an absolute path
 
 
 class EvoexpError(Exception):
@@ -28,6 +32,13 @@ def printable(text: str) -> str:
         sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode()
         for sign in text
     )
+
+
+def portable(text: str) -> str:
+    """Return a text without the folders of this machine: `evoexp/cli.py`, `scene.yaml`."""
+    for folder in sorted(filter(os.path.isabs, sys.path), key=len, reverse=True):
+        text = text.replace(f"{folder}/", "")
+    return _FOLDERS.sub("", text)
 
 
 def brief(text: str, most: int = _LONGEST) -> str:

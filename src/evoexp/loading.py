@@ -61,12 +61,14 @@ def load(
 ) -> Frames:
     """Load the stored results of an experiment, or of one run by its hash.
 
-    `evoexp.load("4da921").summaries.groupby("label")[["best_cost", "cpu_s"]].median()`
+    Examples:
+        >>> frames = evoexp.load("rana_planar", budget="smoke")  # or a hash: evoexp.load("4da921")
+        >>> frames.summaries.groupby("label")[["best_cost", "cpu_s"]].median()
 
     Args:
         what: Name or file of an experiment, or any unique prefix of a run's hash.
         overrides: Changes of the experiment, as on the command line.
-        budget: Name of the experiment's budget.
+        budget: Name of the experiment's budget: `paper`, `quick`, `smoke`.
         multirun: Whether overrides with commas are swept over.
         outputs: Root of the outputs; by default `EVOEXP_OUTPUTS` or `outputs`.
         config_dir: Folders of options that are searched before all others.
@@ -117,14 +119,10 @@ def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str
     }
     names = dict.fromkeys(name for context in contexts.values() for name in context)
     values = {name: [context.get(name) for context in contexts.values()] for name in names}
-    told = [
-        name
+    return {
+        name: summaries["condition"].map(dict(zip(contexts, own, strict=True)))
         for name, own in values.items()
         if name == SEED or (name not in ORIGIN and any(value != own[0] for value in own))
-    ]
-    return {
-        name: summaries["condition"].map(dict(zip(contexts, values[name], strict=True)))
-        for name in told
     }
 
 

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]  # of the shape that a comment or docstring gives
+IntArray = NDArray[np.int64]  # of the shape that a comment or docstring gives
 BoolArray = NDArray[np.bool_]
 
 
@@ -36,7 +36,7 @@ class Generation(NamedTuple):
     index: int  # type: ignore[assignment]  # 0 is the initial population
     best: FloatArray  # flat solution, best so far
     best_cost: float  # best so far
-    best_cost_in_generation: float
+    best_cost_in_generation: float  # lowest cost of its individuals
     mean_cost: float  # over the finite costs of this generation
     std_cost: float  # over the finite costs of this generation, population standard deviation
     num_feasible: int  # individuals of this generation that the planner's own model accepts
@@ -60,9 +60,9 @@ class Best(NamedTuple):
 
     place: int  # of this generation in its block
     solution: FloatArray  # flat, never changed
-    cost: float
-    terms: dict[str, float]  # never changed
-    solved: bool
+    cost: float  # of this solution
+    terms: dict[str, float]  # the paper's own terms of it, never changed
+    solved: bool  # whether the planner's own model accepts it
 
 
 class Block(NamedTuple):
@@ -73,20 +73,20 @@ class Block(NamedTuple):
 
     first: int  # index of the first generation
     bests: Sequence[Best]  # the first one is at place 0
-    lowest: Sequence[float]  # of each generation, as the columns that follow
-    means: Sequence[float]
-    deviations: Sequence[float]
-    num_feasible: Sequence[int]
-    evaluations: Sequence[int]
-    collision_queries: Sequence[int]
+    lowest: Sequence[float]  # least cost of each generation
+    means: Sequence[float]  # of the finite costs of each generation
+    deviations: Sequence[float]  # population standard deviations of the same
+    num_feasible: Sequence[int]  # individuals of each that the planner's own model accepts
+    evaluations: Sequence[int]  # since the start, up to each
+    collision_queries: Sequence[int]  # configurations judged since the start, up to each
     costs: FloatArray  # (generations, …, individuals)
     # shows the population at a place of the block; empty where the planner has it no longer
     population: Callable[[int], NDArray[Any]]
     # of the generator behind each generation; None: where it is now
     states: Sequence[bytes] | None = None
     criteria: FloatArray | None = None  # of the last generation, see `Generation`
-    stop_reason: str = ""  # likewise
-    arrays: Mapping[str, NDArray[Any]] | None = None  # likewise
+    stop_reason: str = ""  # of the last generation, see `Generation`
+    arrays: Mapping[str, NDArray[Any]] | None = None  # of the last generation, see `Generation`
 
     @classmethod
     def of(cls, generation: Generation) -> "Block":
@@ -173,32 +173,32 @@ def generations(evolution: Iterable[Block | Generation]) -> Iterator[Generation]
 class GenerationRow(NamedTuple):
     """One generation as it is read back from a log, with its link of the chain."""
 
-    index: int  # type: ignore[assignment]  # a tuple has a method of this name
-    best_cost: float
-    best_cost_in_generation: float
-    mean_cost: float
-    std_cost: float
-    num_feasible: int
-    evaluations: int
-    collision_queries: int
-    solved: bool
-    terms: dict[str, float]
+    index: int  # type: ignore[assignment]  # 0 is the initial population
+    best_cost: float  # best so far
+    best_cost_in_generation: float  # lowest cost of its individuals
+    mean_cost: float  # over the finite costs of this generation
+    std_cost: float  # over the same, population standard deviation
+    num_feasible: int  # individuals of this generation that the planner's own model accepts
+    evaluations: int  # since the start
+    collision_queries: int  # configurations judged since the start
+    solved: bool  # whether the planner's own model accepts the best so far
+    terms: dict[str, float]  # the paper's own terms of the best so far; columns term_<name>
     chain: str  # 32 hex digits: xxh3-128 over everything up to and including this generation
 
 
 class SolutionRow(NamedTuple):
     """The best solution so far, logged whenever it improves and at the end."""
 
-    generation: int
-    cost: float
-    values: FloatArray  # flat
+    generation: int  # in which it was found, or the last one
+    cost: float  # of this solution
+    values: FloatArray  # flat, in the planner's documented shape
 
 
 class FrontRow(NamedTuple):
     """Criteria of one population in one generation, from which its front follows."""
 
-    generation: int
-    population: int
+    generation: int  # its index
+    population: int  # its index among co-evolving populations
     criteria: FloatArray  # (individuals, criteria), all minimised
 
 
@@ -206,14 +206,14 @@ class ReplicateSummary(NamedTuple):
     """The one row that a finished or failed replicate leaves in `summary.parquet`."""
 
     condition: str  # 64 hex digits
-    replicate: int
+    replicate: int  # its index
     status: str  # "done" | "failed"
     stop_reason: str  # why the planner ended; for a failed replicate the error in one line
     num_generations: int  # generations after the initial one
-    best_cost: float
-    first_feasible_generation: int | None
-    evaluations: int
-    collision_queries: int
+    best_cost: float  # of the best solution; inf: infeasible
+    first_feasible_generation: int | None  # None: no generation has a feasible individual
+    evaluations: int  # asked for by the algorithm, skipped ones included
+    collision_queries: int  # configurations that the algorithm asked for
     solved: bool  # by the paper's own collision model
     # by the exact certifier, over the whole motion; None: undecided, or there is no motion
     certified: bool | None
@@ -225,12 +225,12 @@ class ReplicateSummary(NamedTuple):
     refuted_at: float | None  # [instant] of the first contact
     refuted_pair: str  # the bodies that touch
     length_unit: str  # of every clearance and length below
-    terms: dict[str, float]  # written as term_<name>
+    terms: dict[str, float]  # the paper's own terms of the best; columns term_<name>
     digest: str  # 32 hex digits: the end of the chain
     certificate_queries: int  # exact distances that the certifier asked for
-    certificate_s: float  # its CPU time, part of cpu_s
-    cpu_s: float
-    wall_s: float
+    certificate_s: float  # CPU time of the certifier [s], part of cpu_s
+    cpu_s: float  # CPU time of the replicate [s]
+    wall_s: float  # its time by the clock [s]
     allowed_contacts: str = ""  # pairs of bodies that may touch somewhere in the motion
     # [length_unit] their greatest depth; 0 where they never touch, None without such pairs
     penetration: float | None = None

@@ -133,7 +133,7 @@ def registered(group: str, name: str) -> Registration | None:
 
 
 def component_class(name: str, field: str = TARGET) -> type[Component]:
-    """Return the class registered under a name; a configuration cannot name other code."""
+    """Return the class registered under a name; SettingError names the nearest if none is."""
     registration = registered(COMPONENTS, name)
     if registration is None:
         must = "a registered component"

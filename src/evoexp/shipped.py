@@ -6,6 +6,7 @@ with, and makes a test fail when results change without a raised revision.
 """
 
 import functools
+import itertools
 import shlex
 from collections import Counter
 from pathlib import Path
@@ -39,6 +40,17 @@ def config_directory() -> Path:
     """Return the shipped `conf`: in the wheel inside the package, in a checkout beside `src`."""
     inside = Path(__file__).parent / "conf"
     return inside if inside.is_dir() else Path(__file__).parents[2] / "conf"
+
+
+def described(path: Path) -> str:
+    """Return the line of an experiment file that says what the experiment is; empty: none does.
+
+    It is the first comment that neither names Hydra's package nor the command that runs the file.
+    """
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    comments = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    lines = (line.removeprefix("#").strip() for line in comments)
+    return next((line for line in lines if not line.startswith(("@package", "evoexp run"))), "")
 
 
 class Shipped(NamedTuple):

@@ -6,6 +6,7 @@ by its path; nothing is coerced but whole numbers into float fields and lists in
 """
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
@@ -20,13 +21,13 @@ MAX_COUNT = 10**9
 LARGEST = 1e100
 SMALLEST = 1e-100  # besides 0: the reciprocal of a smaller number overflows, or its square vanishes
 
-Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
+Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]  # at least 1, at most a thousand million
 NonNegativeCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 # Configurations of a path, pieces of a segment: laid out one by one before anything is run.
 LayoutCount = Annotated[int, Field(ge=1, le=10_000)]
-Rate = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
+Rate = Annotated[float, Field(ge=0.0, le=1.0)]  # a probability or share in [0, 1]
+Positive = Annotated[float, Field(gt=0.0)]  # above 0
+NonNegative = Annotated[float, Field(ge=0.0)]  # 0 or above
 Vector = tuple[float, ...]
 
 
@@ -47,6 +48,13 @@ class Settings(BaseModel):
     """Frozen, strictly typed settings that are part of a component, such as an obstacle."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+    def model_post_init(self, context: Any) -> None:
+        """Check the fields together, once each of them is valid."""
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse fields that contradict each other by a SettingError."""
 
     def demand(self, field: str, holds: bool, must: str) -> None:
         """Refuse these settings unless a condition on a field holds.
@@ -76,11 +84,21 @@ AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
 class Component(Settings):
-    """Settings with a registered name, which `_target_` in a YAML option refers to."""
+    """Settings with a registered name, which `_target_` in a YAML option refers to.
+
+    A class of evoexp that gives itself no name has its class's: `OnePoint` is `one_point`. Bases of
+    several components have none, and say so: `class Crossover(Operator, is_base=True)`.
+    """
 
     component: ClassVar[str]  # the registered name
     # raised whenever the same settings give other results than before; part of every identity
     revision: ClassVar[int] = 1
+
+    def __init_subclass__(cls, is_base: bool = False, **options: Any) -> None:
+        """Name a component of evoexp; a guest's name begins with that of its distribution."""
+        super().__init_subclass__(**options)
+        if cls.__module__.startswith("evoexp.") and not is_base and "component" not in vars(cls):
+            cls.component = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     @model_validator(mode="before")
     @classmethod

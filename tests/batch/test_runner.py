@@ -3,7 +3,7 @@
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.errors import DamagedStore, SettingError
+from evoexp.errors import DamagedStore, SettingError, portable
 from evoexp.store import summaries
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import LogContents, read_log
@@ -147,6 +147,8 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
     assert failure["reason"] == read_summaries(directory)["stop_reason"][1] == REASON.format(1)
     assert failure["traceback"].startswith("Traceback (most recent call last):\n")
     assert failure["traceback"].endswith("to fail\nand says why\n")
+    assert 'File "evoexp/batch/jobs.py"' in failure["traceback"], "no folder of this machine"
+    assert portable("no file '/home/me/a/b.stl', 2 m/s") == "no file 'b.stl', 2 m/s"
     assert read_summaries(directory)["status"].tolist() == ["done", "failed", "done"]
     assert "1 replicate failed before" in " ".join(said(1, "--no-report")[0].split())
     assert main(["list", "--failed"]) == 0
@@ -205,10 +207,6 @@ def test_a_killed_or_slow_worker_costs_its_own_replicate_a_retry(
 # Tasks
 
 
-def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
-    return [Outcome(job.condition_id, job.replicate, "", "", b"", wall_s) for job in jobs]
-
-
 @given(
     st.integers(0, 300),
     st.integers(2, 8),
@@ -224,8 +222,10 @@ def test_every_job_is_run_once_and_in_order(
         share = -(-(num_jobs - len(seen)) // (2 * num_workers))  # nobody waits for one worker
         assert 1 <= len(bundle) <= min(MAX_BUNDLE, max(1, share))
         wall, done = tasks[count % len(tasks)]
-        seen += bundle[:done]  # the worker stopped there
-        replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
+        own = bundle[:done]  # the worker stopped there
+        seen += own
+        outcomes = [Outcome(job.condition_id, job.replicate, "", "", b"", wall) for job in own]
+        replicates.end_task((bundle,), outcomes)
     assert seen == waiting
 
 

@@ -82,11 +82,11 @@ def test_conditions_that_become_one_are_one_row_everywhere(
 def test_terminal_and_report_have_all_stored_replicates(evoexp: Evoexp, stored: Path) -> None:
     said = evoexp("run", *PLANAR, "num_replicates=1", "report=paper", *DRAFT)
     assert said.out.count("2 of 2") == 3
-    assert "all stored replicates, here and in the report; 1 requested" in said.out
+    assert "asked for: 1 of each; more are stored, and all count, here" in said.out
     (page,) = (stored / "reports").glob("*/index.md")
     assert "| `num_replicates` | 2 |" in page.read_text()
     said = evoexp("run", *PLANAR, "--no-report")
-    assert "all stored replicates" not in said.out
+    assert "asked for: " not in said.out
 
 
 def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -176,7 +176,7 @@ def test_a_column_is_half_as_wide_and_its_text_is_text_that_can_be_read() -> Non
         fonts = re.findall(r"font(?:-family)?: ([^;\"]*)", svg)
         assert fonts and all(font.endswith("sans-serif") for font in fonts)
     sizes = [float(size) for size in re.findall(r"font(?:-size)?: (?:bold )?([\d.]+)px", svg)]
-    assert sizes and 5.5 <= min(sizes) < max(sizes) <= 8.5
+    assert sizes and 6.0 <= min(sizes) < max(sizes) <= 8.5
 
 
 @pytest.mark.parametrize("width", ["page", "column"])

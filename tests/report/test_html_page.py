@@ -241,6 +241,16 @@ def test_a_card_counts_the_claims_of_whole_experiments() -> None:
     assert found[1].url() == "rana_planar%2B12345678/index.html?home"
 
 
+def test_a_claim_counts_once_that_of_the_readings_first() -> None:
+    scene = summary("rana_planar")._replace(rules=(("free", "rule"),))
+    told = (("planar: free", "depends on the reading (…)"),)
+    readings = summary("rana_claims")._replace(claims=told, rules=(("planar: free", "rule"),))
+    paper = RANA._replace(claims={"rana_planar": 3, "rana_claims": 1})
+    (card,) = html_page.site([scene, readings], [paper], [])["papers"]
+    counts = (("depends on the reading", 1), ("contradicted", 1), ("not judged", 1))
+    assert [own for _, own in card["tallies"]] == [counts, (("undecided", 1),)]
+
+
 def test_reports_of_no_paper_stand_by_themselves() -> None:
     compared = summary("compare_rana_planar", "compare rana_planar")
     others = html_page.site([summary("arena_rana"), compared, summary("ranaplanar")], [RANA], [])[

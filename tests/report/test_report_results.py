@@ -143,7 +143,7 @@ def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSett
     names = ("best cost", "CPU time, search [s]")  # all took as many evaluations
     headings = [heading for heading, _ in page.comparisons]
     assert headings == [f"{name}: pairs of conditions" for name in names]
-    stems = ["convergence", "values", "scene", "joints", "covers"]
+    stems = ["scene", "convergence", "values", "joints", "covers"]
     assert [drawing.stem for drawing in page.drawings] == stems
     assert page.tables[0].headers == ("condition", "solved", "certified", "required margin kept")
     assert {"best cost", "CPU time of the search"} <= {q.name for q in page.quantities}

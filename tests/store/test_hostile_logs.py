@@ -39,14 +39,10 @@ NUM_LOGS = counts(10_000, 100_000) if matrices_are_asked_for() else 300
 LITTLE, MOST = 500, 10 * log_reader.MAX_LOG // 2**20
 
 
-def whole_log() -> bytes:
-    """Return a log with everything that a log may hold."""
-    rows = generations(40)
-    rows[2] = rows[2]._replace(arrays={"landscape": np.arange(12.0).reshape(3, 4)})
-    return write(rows, fronts=[FrontRow(3, 0, np.array([[1.0, np.inf], [2.0, 0.5]]))]).content
-
-
-CONTENT = whole_log()
+ROWS = generations(40)
+ROWS[2] = ROWS[2]._replace(arrays={"landscape": np.arange(12.0).reshape(3, 4)})
+# a log with everything that a log may hold
+CONTENT = write(ROWS, fronts=[FrontRow(3, 0, np.array([[1.0, np.inf], [2.0, 0.5]]))]).content
 
 
 def attempt(content: bytes) -> list[str]:

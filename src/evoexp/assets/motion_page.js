@@ -417,6 +417,7 @@
     try { history.replaceState(null, "", `#t=${state.share.toFixed(4)}`); } catch { }  // browsers bear only so many a second
   }
 
+  $("speed").title = `1 ×: the whole motion in ${DURATION} s`;
   $("play").addEventListener("click", () => state.playing ? jump(state.share) : play(true));
   $("time").addEventListener("input", e => jump(Number(e.target.value)));
   $("ghosts").addEventListener("change", e => { state.ghosts = e.target.checked; show(); });

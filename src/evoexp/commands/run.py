@@ -98,7 +98,7 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
         if what:
             say(f"skipped: {label}: {what}")
     if all(lacks.values()):
-        raise SettingError("planner", f"installed: {next(iter(lacks.values()))}", "missing")
+        raise SettingError("planner", f"one that is installed: {what}", label)
     return [each for each in experiment.conditions if not lacks[each.label]]
 
 
@@ -113,9 +113,9 @@ def _run(
         return []
     planned = sorted({count for _, count, _ in wanted})
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
+    say("kernels that this machine has not run before are compiled first, for minutes")
     failures, counts = [], Counter(job.condition_id for job in batch.jobs)
-    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    missing = {key: (labels[key], counts[key]) for key in counts}
+    missing = {c.id: (notes["label"], counts[c.id]) for c, _, notes in wanted if c.id in counts}
     bars = BatchProgress(plain_console(), missing, curves)
     with bars.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
@@ -185,8 +185,8 @@ def summary_table(experiment: Experiment) -> Table:
         if experiment.budget_of(label) == "smoke":
             caption = "budget=smoke checks that everything runs; nothing can be concluded from it"
         if rows[-1]["planned"] > asked:
-            number = f"{experiment.num_replicates} requested"
-            caption = f"all stored replicates, here and in the report; {number}"
+            count_all = "more are stored, and all count, here and in the report"
+            caption = f"asked for: {experiment.num_replicates} of each; {count_all}"
     table = run_table(experiment.report_name, rows)
     table.caption = caption
     return table

@@ -1,6 +1,7 @@
 """`evoexp site`: the home page of all reports."""
 
 import argparse
+import functools
 import importlib
 from collections import Counter
 
@@ -11,12 +12,15 @@ from evoexp.errors import EvoexpError, NothingStored
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages.build import ReportFiles
 from evoexp.report.pages.html_page import HTML, Paper, StoredRun, home_page, summaries
+from evoexp.report.results.parameters import option
 from evoexp.report.statistics.judging import registered_rules
+from evoexp.shipped import config_directory, shipped
 from evoexp.store.files import write_file
 from evoexp.store.identity import ORIGIN
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written
+PAPER, FEWER = "paper", "paper, fewer runs"  # budgets
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -55,6 +59,8 @@ def home_files() -> ReportFiles:
         experiment, label, budget = (str(origin[key] or "") for key in ORIGIN)
         budget += ", changed" * bool(budget and origin["changed"])
         counts = len(run.completed()), run.num_planned(), len(run.failed())
+        if budget == PAPER and 1 < counts[1] < planned_by(experiment):
+            budget = FEWER
         runs.append(StoredRun(name, experiment, label, budget, *counts))
     if not found and not runs:
         raise NothingStored(
@@ -62,6 +68,15 @@ def home_files() -> ReportFiles:
         )
     runs.sort(key=lambda run: (run.experiment, run.budget, run.label, run.hash12))
     return ReportFiles(outputs / "reports", {HTML: home_page(found, papers(), runs)})
+
+
+@functools.cache
+def planned_by(experiment: str) -> int:
+    """Return the number of replicates that a shipped experiment plans; 0: it is not shipped."""
+    if all(row.experiment != experiment for row in shipped()):
+        return 0
+    entry = option(config_directory() / "experiment" / f"{experiment}.yaml").get("num_replicates")
+    return int(entry.value) if entry else 0
 
 
 def papers() -> list[Paper]:

@@ -13,7 +13,6 @@ is the package's own.
 import contextlib
 import functools
 import importlib.util
-import itertools
 import os
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
@@ -23,7 +22,7 @@ from typing import NamedTuple
 from evoexp import shipped
 from evoexp.errors import RegistrationError, SettingError, UnknownOption
 from evoexp.registry import CONF, Registration, registrations
-from evoexp.shipped import Option
+from evoexp.shipped import Option, described
 
 VARIABLE, ARGUMENT = "EVOEXP_CONFIG_DIR", "--config-dir"
 EXPERIMENT = "experiment"
@@ -124,11 +123,5 @@ def is_file(experiment: str) -> bool:
 
 
 def description(experiment: str) -> str:
-    """Return the line of an experiment file that says what the experiment is.
-
-    It is the first comment that neither names Hydra's package nor the command that runs the file.
-    """
-    text = Path(find(EXPERIMENT, experiment).path).read_text(encoding="utf-8")
-    comments = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
-    lines = (line.removeprefix("#").strip() for line in comments)
-    return next((line for line in lines if not line.startswith(("@package", "evoexp run"))), "")
+    """Return the line of an experiment file that says what the experiment is."""
+    return described(Path(find(EXPERIMENT, experiment).path))

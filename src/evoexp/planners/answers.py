@@ -17,7 +17,7 @@ from evoexp.collision.certifier.certificate import Certificate, certificate, is_
 from evoexp.paths.motion import Motion
 from evoexp.records import BoolArray, FloatArray
 
-Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stands for any number
+Shape = tuple[Any, ...]  # of a solution: a tuple per part, ((12, 7),); a leading ...: any number
 LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
 SAME = 1e-6  # [unit of the values] files hold rounded numbers: what differs by less is the same
 KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave as it is

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.scene import Part
-from evoexp.evolution.succession import CostStatistics, cost_statistics
+from evoexp.evolution.succession import cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.answers import JudgementArrays as JudgementArrays
@@ -254,8 +254,7 @@ class Keeper:
         judgement: JudgementArrays,  # of this population
     ) -> Block:
         """Keep the best individual of a generation if it improves, and return a block of it."""
-        statistics, feasible = cost_statistics(judgement.cost), judgement.feasible
-        k = statistics.best
+        feasible, k = judgement.feasible, cost_statistics(judgement.cost).best
         lowest = float(judgement.cost[k])
 
         def candidate(k: int, solved: bool) -> Candidate:
@@ -266,54 +265,32 @@ class Keeper:
             self.keep_proven(judgement.cost, feasible, candidate)
         elif self.improves(lowest):
             self.keep(lowest, candidate(k, bool(feasible[k])))
-        return self.record(
-            statistics,
-            judgement.cost,
-            population,
-            lowest=lowest,
-            num_feasible=int(np.count_nonzero(feasible)),
-            evaluations=len(judgement.cost),
-            collision_queries=judgement.collision_queries,
-        )
+        num_feasible, queries = int(np.count_nonzero(feasible)), judgement.collision_queries
+        return self.record(judgement.cost, population, queries, num_feasible=num_feasible)
 
     def record(
         self,
-        statistics: CostStatistics,  # mean and deviation of its costs
-        costs: FloatArray,  # (individuals,); see `Generation`
+        judged: FloatArray,  # (individuals,) costs
         population: NDArray[Any],  # any shape
-        *,
-        lowest: float,  # its lowest cost; where the best is a team, the lowest of a team
-        num_feasible: int,  # individuals that the planner's own model accepts
-        evaluations: int,  # of this generation
         collision_queries: int,  # configurations that this generation asked for
-        # see `Generation`
-        criteria: FloatArray | None = None,
-        stop_reason: str = "",
-        arrays: Mapping[str, NDArray[Any]] | None = None,
+        *,
+        num_feasible: int | None = None,  # for the planner's own model; None: all of a finite cost
+        evaluations: int | None = None,  # of this generation; None: one per individual
+        **differing: Any,  # fields of the block that do not follow from the above
     ) -> Block:
         """Count a generation and return a block of it."""
+        best, mean, deviation = cost_statistics(judged)
+        feasible = int(np.isfinite(judged).sum()) if num_feasible is None else num_feasible
         self.index += 1
-        self.evaluations += evaluations
+        self.evaluations += len(judged) if evaluations is None else evaluations
         self.collision_queries += collision_queries
-        return Block(  # by position: half the time
-            self.index,
-            [self.standing],
-            [lowest],
-            [statistics.mean],
-            [statistics.std],
-            [num_feasible],
-            [self.evaluations],
-            [self.collision_queries],
-            costs[None],
-            lambda place: population,
-            None,
-            criteria,
-            stop_reason,
-            arrays,
-        )
+        columns = [judged.item(best)], [mean], [deviation], [feasible], [self.evaluations]
+        totals, shown = [self.collision_queries], (judged[None], lambda place: population)
+        block = Block(self.index, [self.standing], *columns, totals, *shown)
+        return block._replace(**differing) if differing else block
 
 
-class WrappedPlanner(PlannerDefaults, Component):
+class WrappedPlanner(PlannerDefaults, Component, is_base=True):
     """Answers as the wrapped planner does; controls write `populations`, references `evolve`."""
 
     planner: Any  # the planner that it stands beside; `Condition` checks that it is one

@@ -119,7 +119,7 @@ AppendArm = Callable[[Any, int], ArmParts]
 """Adds the joints of the arm of a number to a `pin.Model`; returns what comes with them."""
 
 
-class Robot(Component):
+class Robot(Component, is_base=True):
     """Base of every robot description: names its arms, which are built together."""
 
     def chains(self) -> tuple[AppendArm, ...]:
@@ -131,11 +131,11 @@ class Robot(Component):
         return []
 
     def build(self) -> Assembly:
-        """Append all arms to one model, with q = (arm 0, arm 1, …)."""
+        """Return all arms in one Pinocchio model with coal bodies, q = (arm 0, arm 1, …)."""
         return assembled(self.chains())
 
 
-class Chain(Robot):
+class Chain(Robot, is_base=True):
     """Base of a single arm, which can stand as a robot of its own."""
 
     def append_to(self, model: Any, arm: int) -> ArmParts:

@@ -175,13 +175,13 @@ class LogContents(NamedTuple):
     """Everything that a log holds."""
 
     condition_id: str  # 64 hex digits
-    config_json: bytes
-    replicate: int
-    generations: list[GenerationRow]
-    solutions: list[SolutionRow]
-    fronts: list[FrontRow]
-    summary: ReplicateSummary
-    environment: dict[str, Any]
+    config_json: bytes  # canonical form of the condition
+    replicate: int  # its index
+    generations: list[GenerationRow]  # in order
+    solutions: list[SolutionRow]  # every improvement, the last one is the best
+    fronts: list[FrontRow]  # of generations whose front is recorded
+    summary: ReplicateSummary  # of the replicate
+    environment: dict[str, Any]  # versions and machine that it was run with
     attachments: dict[str, bytes]  # without the configuration
     content_digest: str  # 32 hex digits, over all messages
     # (generations,) [s] CPU time of the replicate when each was logged; NaN in logs of older code
@@ -247,9 +247,10 @@ def _summary(log: CheckedLog, place: Place | None) -> ReplicateSummary:
 
 
 def read_log(source: Source, place: Place | None = None) -> LogContents:
-    """Return everything that a log holds, verified.
+    """Return everything that a log holds, verified: `read_log("0007.mcap").generations[-1]`.
 
-    CorruptLog is raised where it is damaged, or does not belong to a place that is given.
+    Its source is a path, or the content. CorruptLog is raised where a log is damaged, or is not
+    that of the condition and replicate given as its place.
     """
     with _opened(source) as log:
         rows: dict[str, list[Any]] = {topic: [] for topic in _RECORDS}

@@ -12,7 +12,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
+from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest, portable
 from evoexp.store import identity
 from evoexp.store.files import reason, remove_stale, sync_directory, warn, write_file, write_files
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, DamagedFile, Plan
@@ -219,8 +219,9 @@ class RunDirectory:
             self.failure_path(replicate).unlink(missing_ok=True)
 
     def write_failure(self, replicate: int, reason: str, traceback: str) -> None:
-        """Keep why a replicate failed: one line, and the traceback."""
+        """Keep why a replicate failed, a line and the traceback, without this machine's folders."""
         self.replicates.mkdir(parents=True, exist_ok=True)
+        reason, traceback = map(portable, (reason, traceback))
         failure = {"replicate": replicate, "reason": reason, "traceback": traceback}
         write_file(self.failure_path(replicate), json.dumps(failure, indent=2).encode() + b"\n")
 

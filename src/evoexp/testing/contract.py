@@ -27,11 +27,11 @@ from evoexp.validation import Component
 # terms of planners whose best is more than one individual: a team, or a whole plan
 BETTER_THAN_ALONE = {"team_cost", "sub_path", "phase"}
 STARTS_ANEW = "attempts"  # a term of planners that begin again where an attempt has failed
-Check = Callable[[Condition], None]
+Check = Callable[[Condition], None]  # raises `ContractBroken`
 Demand = tuple[object, str, object]  # whether an obligation is kept, what it is, what was instead
 NUM_GENES, SIZE, SPARE = 6, 9, 4  # of a small population; SPARE columns pad the offspring
 NOTHING = np.empty((0, 2))
-CHECKS: list[Check] = []
+CHECKS: list[Check] = []  # all obligations of a planner, each a function of a condition
 
 
 class ContractBroken(AssertionError):

@@ -9,7 +9,7 @@ other robots, pairs that never touch are proven to, and so nobody judges them.
 """
 
 import itertools
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def _grid(
     return q, float(np.sum(way[moving] * 0.5 * step))
 
 
-class CollisionModel(Component):
+class CollisionModel(Component, is_base=True):
     """Base of the collision models that cover bodies: sphere sets and capsules."""
 
     def cover(self, item: Any, given: FloatArray | None = None) -> body_covers.Cover:
@@ -150,8 +150,6 @@ class CollisionModel(Component):
 class SphereSets(CollisionModel):
     """Bodies as sets of spheres that cover them."""
 
-    component: ClassVar[str] = "sphere_sets"
-
     # how far spheres may reach beyond a body; less takes more spheres [length unit]
     inflation: Positive
 
@@ -164,8 +162,6 @@ class SphereSets(CollisionModel):
 
 class BodyCapsules(CollisionModel):
     """Bodies as one capsule each that covers them; balls and capsules as they are."""
-
-    component: ClassVar[str] = "body_capsules"
 
     padding: NonNegative  # by how much every capsule is thicker than it must be [length unit]
     # whether the capsule of a cylinder is as thick as the cylinder and reaches beyond its

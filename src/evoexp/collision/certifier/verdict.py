@@ -81,11 +81,7 @@ class _Candidate(NamedTuple):
 
 class _Judgement:
     def __init__(
-        self,
-        scene: Scene,
-        motion: Motion,
-        security_margin: float | FloatArray,
-        resolution: float,
+        self, scene: Scene, motion: Motion, security_margin: float | FloatArray, resolution: float
     ) -> None:
         _check(scene, motion, security_margin)
         self.margins = np.empty(len(scene.pairs))

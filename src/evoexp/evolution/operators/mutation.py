@@ -11,7 +11,7 @@ from evoexp.records import FloatArray
 from evoexp.validation import NonNegativeCount, Positive
 
 
-class GeneMutation(Mutation):
+class GeneMutation(Mutation, is_base=True):
     """Mutates every gene with the rate, or one gene of an individual."""
 
     # whether an individual is mutated with the rate, in one gene; else every gene is
@@ -50,8 +50,6 @@ class NonUniformMutation(GeneMutation):
     1/2; r is uniform in [0, 1) and s = (1 − t/T)^b.
     """
 
-    component: ClassVar[str] = "non_uniform_mutation"
-
     mutation_power: NonNegativeCount = 2  # b, whole [-]
 
     @staticmethod
@@ -73,7 +71,6 @@ class NonUniformMutation(GeneMutation):
 class GaussianMutation(GeneMutation):
     """Adds s (h − l) z to a gene, z a normal deviate, within its limits l, h (Schwefel 1981)."""
 
-    component: ClassVar[str] = "gaussian_mutation"
     takes_normals: ClassVar[bool] = True
 
     mutation_std: Positive = 0.1  # s, standard deviation in units of a gene's range [-]
@@ -92,8 +89,6 @@ class GaussianMutation(GeneMutation):
 
 class UniformReset(GeneMutation):
     """Draws a gene anew, uniform within its limits (Michalewicz 1992)."""
-
-    component: ClassVar[str] = "uniform_reset"
 
     @staticmethod
     @kernel
@@ -114,8 +109,6 @@ class AlleleMutation(Mutation):
     step], as printed, or in [−step, step) in the symmetric reading. The change is made only if the
     result lies in [l, h), the gene's limits; otherwise the allele keeps its value.
     """
-
-    component: ClassVar[str] = "allele_mutation"
 
     step: Positive  # largest change, in the units of the genes
     symmetric: bool = False  # whether genes may decrease, too
@@ -143,8 +136,6 @@ class AlleleMutation(Mutation):
 
 class BitFlips(Mutation):
     """Flips every bit, 0.0 or 1.0, with the rate as probability (Holland 1975)."""
-
-    component: ClassVar[str] = "bit_flips"
 
     def num_uniforms(self, genome: Genome, count: int) -> int:
         """Return one for every bit."""

@@ -1,6 +1,6 @@
 """Selection of parents: by roulette, by tournaments or by ranks."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -50,8 +50,6 @@ class InverseRoulette(Selection):
     A cost below 1e-300 counts as 0, because a sum of inverses would overflow.
     """
 
-    component: ClassVar[str] = "inverse_roulette"
-
     @staticmethod
     @kernel
     def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
@@ -73,8 +71,6 @@ class DifferenceRoulette(Selection):
     likely, and an infeasible individual is still not drawn.
     """
 
-    component: ClassVar[str] = "difference_roulette"
-
     @staticmethod
     @kernel
     def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
@@ -92,8 +88,6 @@ class DifferenceRoulette(Selection):
 
 class FitnessRoulette(Selection):
     """Roulette by the fitness max(C_max − cost, 0) (Rana & Zalzala 1995, Eq. 7)."""
-
-    component: ClassVar[str] = "fitness_roulette"
 
     fitness_offset: NonNegative  # C_max
 
@@ -115,8 +109,6 @@ class LinearRanking(Selection):
     (P − 1) is the expected number of copies of an individual among P parents. Equal costs, infinite
     ones included, share the mean of their ranks.
     """
-
-    component: ClassVar[str] = "linear_ranking"
 
     # s: offspring expected of the best one; 1 is no selection at all, 2 leaves the worst without
     rank_pressure: Annotated[float, Field(ge=1.0, le=2.0)] = 2.0
@@ -149,8 +141,6 @@ class Tournament(Selection):
     ones included, the contestant drawn first. So a population without one feasible member is
     sampled uniformly.
     """
-
-    component: ClassVar[str] = "tournament"
 
     tournament_size: Count = 2  # contestants; 1 is no selection at all
 

@@ -230,8 +230,7 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
             colour, x = style.condition_colour(int(position)), rows["error"]
             name = f"printed, {condition} (their n = {int(rows['total'].iloc[0])})"
             axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
-            look = {"label": name, "mew": 1.4, "zorder": 5}
-            marks.hollow(axes, x, rows["share"], "D", colour, 5, **look)
+            marks.hollow(axes, x, rows["share"], "D", colour, 5, label=name, mew=1.4, zorder=5)
         axes.set(xlim=(0.0, greatest), ylabel="P(position error < x)")
         axes.set_xlabel(f"x [{table['length_unit'].iloc[0]}]")
     whole.set(ylim=(-0.02, 1.03), title="a  whole range")
@@ -242,7 +241,8 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
         side, offset = ("right", -6) if row.error > 0.7 * greatest else ("left", 7)
         words: dict[str, Any] = {"color": style.condition_colour(row.position), "fontsize": 7.5}
         words |= {"ha": side, "path_effects": marks.HALO, "zorder": 6}
-        marks.write(close, f"{100 * row.share:.1f} %", (row.error, row.share), (offset, 4), **words)
+        place = offset, 4 if row.position else -10
+        marks.write(close, f"{100 * row.share:.1f} %", (row.error, row.share), place, **words)
     style.legend_below(figure, [whole], 2)
     return figure
 

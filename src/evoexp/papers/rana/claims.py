@@ -7,6 +7,7 @@ import numpy as np
 
 from evoexp.papers.rana import measures
 from evoexp.papers.rana.measures import AT, BETWEEN, EVENNESS
+from evoexp.planners.baselines.real_vector_controls import IteratedLocalSearch
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
@@ -21,6 +22,7 @@ from evoexp.report.statistics.judging import Judge, Rules
 
 PRINTED = "as printed"  # label of the printed setting among the ablations
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
+NO_LOCAL_SEARCH = "no local search beside it: see rana_claims"
 COST = "best cost"
 BEST = comparisons.by_column("best_cost")
 COMPARED = Measure(COST, BEST), Measure(EVENNESS, measures.unevenness, "deg")
@@ -124,7 +126,12 @@ def evolution(results: Results, own_judge: Judge, condition: ConditionResults, w
 def evolution_adds(
     judge: Judge, condition: ConditionResults, controls: Controls, who: str = ""
 ) -> Claim:
-    """Judge what evolution adds to each control, that of the lowest median cost first."""
+    """Judge what evolution adds to each control, that of the lowest median cost first.
+
+    It is not judged beside weaker controls than local search alone.
+    """
+    if not any(isinstance(c.condition.planner, IteratedLocalSearch) for c in controls):
+        judge = judge._replace(reason=judge.reason or NO_LOCAL_SEARCH)
     pairs = [(condition, control) for control in controls if control.done]
     rows = {row.quantity: row for row in comparisons.compared(pairs, BEST, judge.settings)}
     shown = [control for control in controls if control.label in rows]

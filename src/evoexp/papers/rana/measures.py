@@ -17,7 +17,7 @@ from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.run_measures import counted, grouped, summed
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons
-from evoexp.report.statistics.comparisons import FamilyComparison
+from evoexp.report.statistics.comparisons import Family, FamilyComparison
 from evoexp.report.statistics.inference import Proportion
 
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
@@ -312,6 +312,8 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
     ),
     "is_flat": lambda scene: planar(scene.with_data[0]),
+    # the first condition of each scene against the others there
+    "scene_families": lambda scenes: [Family.of(scene.with_data) for scene, _ in scenes],
     "straight_terms": lambda condition: condition.evaluate(straight_line(condition)),
     # runs whose centres, or bodies, come closer than the safety distance
     "dips": lambda condition: int(np.sum(condition.column(BETWEEN) < margin(condition))),

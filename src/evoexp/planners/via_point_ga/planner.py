@@ -10,10 +10,10 @@ arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
@@ -30,14 +30,7 @@ from evoexp.planners.via_point_ga.string_operators import NewTrajectories, Strin
 from evoexp.planners.via_point_ga.strings import Problem, Search, Strings, settle, smooth
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.validation import (
-    Component,
-    Count,
-    LayoutCount,
-    NonNegativeCount,
-    Positive,
-    Rate,
-)
+from evoexp.validation import Component, Count, LayoutCount, NonNegativeCount, Positive, Rate
 
 SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
@@ -46,7 +39,6 @@ SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between vi
 class ViaPointGa(ArmDefaults, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4 (Tables 1 and 3)."""
 
-    component: ClassVar[str] = "via_point_ga"
     is_real_coded: ClassVar[bool] = True
 
     num_via_points: LayoutCount  # N; instants 1 … N are judged, 0 is the start, N the goal
@@ -74,11 +66,9 @@ class ViaPointGa(ArmDefaults, Component):
     # counts as colliding at one instant more
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _samples_halve(self) -> Self:
+    def _check(self) -> None:
         must = f"one of {', '.join(map(str, SAMPLES))}"
         self.demand("samples_per_segment", self.samples_per_segment in SAMPLES, must)
-        return self
 
     @property
     def operators(self) -> Operators:

@@ -278,7 +278,6 @@ class Search(GeneticSearch):
     """One run, and memory for its generations."""
 
     def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
-        """Begin a run."""
         ga, strings = planner.ga, Strings(planner, problem)
         population, offspring = strings.empty(ga.population_size), strings.empty(ga.num_offspring)
         # testing covered bodies takes far longer than a call

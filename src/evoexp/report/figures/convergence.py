@@ -55,12 +55,14 @@ def draw_cost(table: pd.DataFrame) -> Figure:
 
 
 def draw_best(table: pd.DataFrame) -> Figure:
-    """Draw medians of the best cost only, for many conditions at once, named at their ends."""
+    """Draw medians of the best cost only, many curves without quartiles, named at their ends."""
     best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
     across, curves = _across(best), list(groups(best, ["position", "condition"]))
     figure, (axes,) = style.panels(max(4.4, LINE * len(curves)))
     for k, ((_, condition), curve) in enumerate(curves):
         look = style.curve_look(k) | {"linewidth": 1.2}
+        if len(curves) < marks.MANY:
+            marks.band(axes, curve[across], curve["lower"], curve["upper"], look["color"])
         axes.plot(curve[across], curve["median"], label=f"{condition} ({_counts(curve)})", **look)
     limits = (0, max(1, int(best[across].max())))
     axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")
@@ -228,12 +230,10 @@ def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
         own = own[np.isfinite(own[["median", "lower", "upper"]]).all(axis=1)]
         if own.empty:
             continue
-        errors = [own["median"] - own["lower"], own["upper"] - own["median"]]
-        look: dict[str, Any] = {"color": style.condition_colour(k), "marker": "o", "ms": 4}
-        axes.errorbar(own["column"], own["median"], yerr=errors, capsize=2.0, **look)
-        last = own.iloc[-1]
-        place = float(last["column"]), float(last["median"])
-        ends.append((*place, panel, style.condition_colour(k)))
+        colour, last = style.condition_colour(k), own.iloc[-1]
+        marks.band(axes, own["column"], own["lower"], own["upper"], colour)
+        axes.plot(own["column"], own["median"], color=colour, marker="o", ms=4)
+        ends.append((float(last["column"]), float(last["median"]), panel, colour))
     ticks = table.drop_duplicates("column").sort_values("column")
     axes.set_xticks(ticks["column"], ticks["x"])
     axes.margins(x=0.05)
@@ -292,15 +292,17 @@ def draw_facets(table: pd.DataFrame) -> Figure:
         of_base = shown[shown["base"] == base]
         own, ends = of_base[of_base["facet"] == facet], []
         for level, curve in groups(own, "level"):
-            axes.plot(curve["evaluations"], curve["median"], color=colours[level], linewidth=1.1)
-            last = curve.iloc[-1]
+            across, last = curve["evaluations"], curve.iloc[-1]
+            marks.band(axes, across, curve["lower"], curve["upper"], colours[level])
+            axes.plot(across, curve["median"], color=colours[level], linewidth=1.1)
             place = float(last["evaluations"]), float(last["median"])
             ends.append((*place, str(last["value"]), colours[level]))
         # costs but for the first ones, which are far above the others
-        settled = of_base[of_base["generation"] >= SETTLED * of_base["generation"].max()]["median"]
-        low, high = (settled.min(), settled.max()) if settled.notna().any() else (0.0, 1.0)
-        room = 0.05 * (high - low) or 1.0
-        axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=(low - room, high + room))
+        settled = of_base[of_base["generation"] >= SETTLED * of_base["generation"].max()]
+        low, high = settled["lower"].min(), settled["upper"].max()
+        low, high = (low, high) if low <= high else (0.0, 1.0)
+        room, most = 0.05 * (high - low) or 1.0, float(of_base["evaluations"].max())
+        axes.set(xlim=(0.0, most), ylim=(low - room, high + room))
         axes.set_title("\n".join(word for word in (base, facet) if word))
         axes.set_xlabel("evaluations")
         axes.set_ylabel("best cost so far" if style.begins_line(axes) else "")
@@ -308,5 +310,7 @@ def draw_facets(table: pd.DataFrame) -> Figure:
         style.shorten_thousands(axes.xaxis)
         name_ends(axes, ends)
     setting = table["setting"].iloc[0]
-    style.keys_below(figure, [style.key(f"medians; at the ends of curves: {setting}", lw=0)])
+    style.keys_below(
+        figure, [style.key(f"medians, quartiles; at the ends of curves: {setting}", lw=0)]
+    )
     return figure

@@ -291,11 +291,10 @@ def draw_profiles(table: pd.DataFrame) -> Figure:
 def critical_difference_table(found: Standing, significance: float) -> pd.DataFrame:
     """Return mean ranks, best first, with the critical difference."""
     table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
-    table["problems"] = len(found.problems)
+    sizes = len(found.planners), len(found.problems)
+    table["problems"] = sizes[1]
     table["friedman_p"] = friedman(found.lengths).p_value
-    table["critical_difference"] = critical_difference(
-        len(found.planners), len(found.problems), significance
-    )
+    table["critical_difference"] = critical_difference(*sizes, significance)
     return table.sort_values("mean_rank", kind="stable", ignore_index=True)
 
 
@@ -329,13 +328,12 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
         ends = ranks[first] - 0.008 * count, ranks[last] + 0.008 * count
         y = -BAR * (k + 1)
         axes.plot(ends, [y, y], color=style.NEUTRAL, linewidth=3.5, solid_capstyle="butt")
-    for k, row in enumerate(table.itertuples()):
+    for k, (planner, rank) in enumerate(zip(table["planner"], ranks, strict=True)):
         on_left = k < left
         y = -BAR * (len(groups) + 1) - LINE * ((k if on_left else count - 1 - k) + 0.5)
         end = 1.0 - 0.06 * (count - 1) if on_left else count + 0.06 * (count - 1)
-        rank = float(ranks[k])
         axes.plot([rank, rank, end], [0.0, y, y], color=style.NEUTRAL, linewidth=0.8)
-        name = style.shortened(str(row.planner), 26)
+        name = style.shortened(str(planner), 26)
         text = f"{name}  {rank:.2f} " if on_left else f" {rank:.2f}  {name}"
         axes.text(end, y, text, ha="right" if on_left else "left", va="center")
     return figure

@@ -27,6 +27,9 @@ from evoexp.report.figures import groups, records, rounded, style
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
 STANDING = {"obstacle": OBSTACLE, "object": OBJECT}  # colours of bodies that are no robot's
+ALIKE = (
+    1.25  # [-] room of all panels together over that of the widest one, up to which they share it
+)
 LINE = 0.012  # [-] of the picture's radius: half the width of links without thickness
 FLOOR = 1.1  # [-] of the picture's radius: half the edge of the part of a half-space that is drawn
 NO_LIMIT = 1e6  # [rad, length unit] from here on a joint has no limit
@@ -127,8 +130,12 @@ def _row(element: str, shape: Shape, pose: FloatArray) -> dict[str, Any]:
 
 
 def draw_scenes(table: pd.DataFrame) -> Figure:
-    """Draw one panel per motion, and name the elements below."""
-    figure = _panels(table, 3.5, lambda panel: table[table["panel"] == panel])
+    """Draw one panel per motion, those of about one size in one scale; name the elements below."""
+    own = dict(groups(table, "panel"))
+    low, high = _room(table)
+    widest = max(np.ptp(_room(rows), axis=0).max() for rows in own.values())
+    is_shared = table["length_unit"].nunique() == 1 and (high - low).max() <= ALIKE * widest
+    figure = _panels(table, 3.5, lambda panel: table if is_shared else own[panel])
     colour = style.arm_colour(0)
     keys: dict[str, Any] = {
         "start": Patch(color=colour, label="start"),
@@ -162,10 +169,8 @@ def _panels(table: pd.DataFrame, height: float, room: Callable[[int], pd.DataFra
 def draw_joints(table: pd.DataFrame) -> Figure:
     """Draw every joint in a panel of its own, four side by side, with its limits."""
     joints = list(table.groupby("joint", sort=False))
-    lines = -(-len(joints) // 4)
-    figure = style.figure(1.4 * lines + 0.2)
-    for k, (joint, own) in enumerate(joints):
-        axes = figure.add_subplot(lines, 4, k + 1)
+    figure, panels = style.panels(1.4, len(joints), 4, 0.2)
+    for axes, (joint, own) in zip(panels, joints, strict=True):
         axes.plot(own["instant"], own["value"], color=style.arm_colour(0))
         for bound in own[["low", "high"]].iloc[0]:
             if np.isfinite(bound):
@@ -175,7 +180,7 @@ def draw_joints(table: pd.DataFrame) -> Figure:
         axes.tick_params(labelsize=6.5)
         axes.yaxis.set_major_locator(style.few_ticks())
         axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
-        if k >= len(joints) - 4:
+        if style.ends_column(axes, panels):
             axes.set_xlabel("instant", fontsize=7)
     return figure
 
@@ -243,7 +248,7 @@ def _panel(
             axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.8)
     else:  # all surfaces in one collection, which sorts them by depth
         pad = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
-        view: dict[str, Any] = {"view": VIEW, "zoom": 1.05, "ticks": (3, 3)}
+        view: dict[str, Any] = {"view": VIEW, "zoom": 0.88, "ticks": (3, 3)}
         axes = space(figure, place, low, high, pad, unit, **view)
         colours = np.concatenate([shaded(*body[1:]) for body in bodies])
         triangles = np.concatenate([body[1] for body in bodies])

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MultipleLocator, NullLocator
 
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, style
@@ -62,7 +62,7 @@ def draw_values(table: pd.DataFrame) -> Figure:
             marks.dashed(axes, middle)
         axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
         axes.margins(x=0.06)
-        axes.xaxis.set_major_locator(style.few_ticks())
+        axes.xaxis.set_major_locator(style.few_ticks() if len(finite) else NullLocator())
         style.shorten_thousands(axes.xaxis)
         if never is not None:  # named above, and parted from the finite values by a line
             between = never - 0.5 * BEYOND / (1.0 + BEYOND) * (never - axes.get_xlim()[0])
@@ -153,7 +153,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     level = float(table["significance"].iloc[0])
     dot: dict[str, Any] = {"marker": "o", "linestyle": "none", **DOT}
-    keys = style.key(f"adjusted p < {level:g}", **dot), style.key(f"≥ {level:g}", **dot, **OPEN)
+    keys = style.key(f"adjusted p < {level:g}", **dot), style.key(f"p ≥ {level:g}", **dot, **OPEN)
     is_clear = table["p_adjusted"] < level
     style.keys_below(figure, [keys[k] for k in (0, 1) if (is_clear == (k == 0)).any()])
     return figure
@@ -190,19 +190,16 @@ def draw_shares(table: pd.DataFrame) -> Figure:
     beyond = MARGIN * max(high - low, 1.0)
     for axes, quantity in zip(panels, quantities, strict=True):
         every = table[table["quantity"] == quantity]
-        own = every[every["total"] > 0]
         for position, rows in groups(every, "position"):
             colour, y = style.row_colour(int(position), len(labels)), rows_of[position]
             if rows["total"].iloc[0]:
-                axes.hlines(
-                    y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
-                )
+                ends = 100 * rows["lower"], 100 * rows["upper"]
+                axes.hlines(y, *ends, color=colour, linewidth=1.6)
                 axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
             counts = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
             marks.beside(axes, y, counts, 1.0)
-        if len(own):
-            for printed in own["printed"].dropna().unique():
-                marks.dashed(axes, 100 * printed)
+        for printed in every.loc[every["total"] > 0, "printed"].dropna().unique():
+            marks.dashed(axes, 100 * printed)
         axes.set_xlim(low - beyond, high + beyond)
         is_wide = high - low >= NEARLY_ALL
         axes.xaxis.set_major_locator(MultipleLocator(25.0) if is_wide else style.few_ticks())

@@ -48,7 +48,7 @@ class _Scale(NamedTuple):
     text: float
 
 
-_SCALES = {"page": _Scale(1.0, 1.0, 1.0), "column": _Scale(3.5 / WIDTH, 0.62, 0.78)}
+_SCALES = {"page": _Scale(1.0, 1.0, 1.0), "column": _Scale(3.5 / WIDTH, 0.62, 0.8)}
 _scale: ContextVar[_Scale] = ContextVar("_scale", default=_SCALES["page"])
 _SCALED = ("size", "labelpad", "handlelength", ".major.pad", "_pad", "linewidth")
 """Endings of the names of parameters that are sizes of text, or distances between parts."""
@@ -137,9 +137,10 @@ def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure that arranges itself [inch]; smaller where it is for a column."""
+    """Return an empty figure that arranges itself [inch]; one for a column is as wide as this."""
     scale = _scale.get()
-    return Figure(figsize=(width * scale.width, height * scale.height), layout="constrained")
+    size = min(width, WIDTH * scale.width), height * scale.height
+    return Figure(figsize=size, layout="constrained")
 
 
 def panels(
@@ -244,14 +245,15 @@ def keys_below(
     figure: Figure | SubFigure, keys: Sequence[Artist], columns: int | None = None
 ) -> None:
     """Put a legend under the whole figure, in as many columns as are wanted (None: all) and fit."""
-    count, look = max(columns or len(keys), 1), dict[str, Any](loc="outside lower center")
-    legend = figure.legend(handles=keys, ncols=count, **look)
-    size = float(legend.get_texts()[0].get_fontsize()) if keys else SMALLEST_TEXT
-    while legend.get_window_extent().width > figure.bbox.width and size > SMALLEST_TEXT:
-        size *= 1.0 if count > 1 else 0.95
-        count = max(count - 1, 1)
+    for count in range(max(columns or len(keys), 1), 0, -1):
+        legend = figure.legend(handles=keys, ncols=count, loc="outside lower center")
+        surplus = max(legend.get_window_extent().width - figure.bbox.width, 0.0)
+        if not surplus or count == 1:
+            break
         legend.remove()
-        legend = figure.legend(handles=keys, ncols=count, fontsize=size, **look)
+    widest = max((_length(text, False) for text in legend.get_texts()), default=0.0)
+    for text in legend.get_texts():
+        _break(text, widest - surplus)
 
 
 def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
@@ -275,6 +277,8 @@ def fit_texts(figure: Figure) -> bool:
     rooms = [  # texts, and the room that they have [pixel]
         (text, part.bbox.x1 - text.get_window_extent().x0) for part in parts for text in part.texts
     ]
+    for axes in figure.axes:
+        axes.apply_aspect()  # which moves what has equal scales
     for axes in figure.axes:
         # a title may go up to the next panel beside its own, or to the edge of the figure
         box, ends = axes.get_window_extent(), [figure.bbox.x1]

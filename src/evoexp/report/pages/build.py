@@ -243,27 +243,23 @@ def _room(text: str) -> float:
 
 def _narrowest(cells: Cells) -> FloatArray:
     """Return the least widths of columns, in letters: those of their longest words."""
-    return np.array(
-        [
-            GAP
-            + max(
-                _room(part) for cell in column for word in cell.split(" ") for part in _parts(word)
-            )
-            for column in zip(*cells, strict=True)
-        ]
-    )
+
+    def longest(cell: str) -> float:
+        return max(_room(part) for word in cell.split(" ") for part in _parts(word))
+
+    return np.array([GAP + max(map(longest, column)) for column in zip(*cells, strict=True)])
 
 
-def _columns(cells: Cells) -> Iterator[Cells]:
-    """Yield tables of as many columns as there is room for; each has the first column."""
+def _columns(cells: Cells) -> list[Cells]:
+    """Return tables of as many columns as there is room for; each begins with name and unit."""
     narrowest = _narrowest(cells)
-    taken = [0]
-    for k in range(1, len(narrowest)):
-        if narrowest[[*taken, k]].sum() > PAGE:
-            yield [[row[j] for j in taken] for row in cells]
-            taken = [0]
-        taken.append(k)
-    yield [[row[j] for j in taken] for row in cells]
+    names = [0, 1] if cells[0][1:2] == ["unit"] else [0]
+    parts = [names]
+    for k in range(len(names), len(narrowest)):
+        if narrowest[[*parts[-1], k]].sum() > PAGE:
+            parts.append(names)
+        parts[-1] = [*parts[-1], k]
+    return [[[row[j] for j in part] for row in cells] for part in parts]
 
 
 def _widths(cells: Cells) -> FloatArray:

@@ -5,6 +5,7 @@ The functions give what the page `comparison` of `page.yaml` names.
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -193,16 +194,10 @@ def rank_rows(ranks: effort_curves.Standing) -> list[tuple[str, ...]]:
     lengths = ranks.lengths
     best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
     having = best, np.isfinite(lengths), np.isfinite(ranks.efforts)
-    return [
-        (
-            planner,
-            f"{ranks.mean_ranks[k]:.2f}",
-            *(str(counted(holds[:, k])) for holds in having),
-        )
-        for k, planner in sorted(
-            enumerate(ranks.planners), key=lambda each: ranks.mean_ranks[each[0]]
-        )
-    ]
+    counts = [[str(counted(column)) for column in holds.T] for holds in having]
+    rows = zip(ranks.mean_ranks, ranks.planners, *counts, strict=True)
+    ordered = sorted(rows, key=itemgetter(0))
+    return [(planner, f"{rank:.2f}", *numbers) for rank, planner, *numbers in ordered]
 
 
 def as_csv(rows: Sequence[Rated]) -> bytes:

@@ -27,7 +27,7 @@ FEW_COLUMNS = 6  # of a table, likewise
 PIXELS_PER_POINT = 4.0 / 3.0
 # first words of verdicts, in order
 VERDICTS = ("reproduced", "practically", "depends", "contradicted", "undecided", "not")
-TELLING = ("snapshot", "scene", "motion", "stages", "operational", "posture", "path")
+TELLING = ("snapshot", "motion", "stages", "operational", "posture", "path", "solution")
 """Parts of the names of figures that show what an experiment is about, the best one first."""
 NO_VALUE = ("–", "")  # cells of a column of numbers that hold none
 LONGEST_NUMBER = 48  # characters of a cell that is still a number, with its interval and unit
@@ -63,6 +63,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
         "headings": [*headings, *((each["figure"].title, each["anchor"]) for each in figures)],
         "claims": sentences,
         "questions": questions,
+        "rules": [(text, verdict.rule) for text, verdict in claims],
         "runs": [[run.hash12, run.label] for run in document.runs],
         "picture": face["file"] if face else "",
     }
@@ -182,19 +183,17 @@ def script_json(value: Any) -> Markup:
 
 def verdict_class(verdict: str) -> str:
     """Return the class of a verdict's badge: its first word."""
-    word = re.match("[a-z]*", verdict)
-    return word[0] if word else ""
+    return re.split("[^a-z]", verdict, maxsplit=1)[0]
 
 
 def number_columns(headers: Sequence[str], rows: Sequence[Sequence[object]]) -> Mapping[int, bool]:
     """Return position → whether every cell of a column begins with a number, or has no value."""
-    found = {}
-    for k in range(len(headers)):
-        cells = [text for row in rows if (text := str(row[k])) not in NO_VALUE]
-        found[k] = bool(cells) and all(
-            len(text) <= LONGEST_NUMBER and _NUMBER.match(text) for text in cells
-        )
-    return found
+    columns = [[str(row[k]) for row in rows] for k in range(len(headers))]
+    known = [[text for text in own if text not in NO_VALUE] for own in columns]
+    return {
+        k: bool(own) and all(len(text) <= LONGEST_NUMBER and _NUMBER.match(text) for text in own)
+        for k, own in enumerate(known)
+    }
 
 
 MAX_LINKS = 3  # reports named beside a run
@@ -222,6 +221,7 @@ class ReportSummary(NamedTuple):
     questions: tuple[tuple[str, str], ...] = ()  # (text, verdict) of questions of ours
     runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
     picture: Picture = ""  # the figure that shows best what it is about; empty if there is none
+    rules: tuple[tuple[str, str], ...] = ()  # (text of a claim, name of its rule)
 
     @property
     def experiment(self) -> str:
@@ -307,13 +307,11 @@ def home_page(
     """Return the home page; the same reports and runs give the same bytes."""
     search = list[dict[str, Any]]()  # the entries that the search looks through
     for each in found:
+        judged = (*each.claims, *each.questions)
         entries = [
             ("report", each.title, ""),
             *(("heading", text, place) for text, place in each.headings if text not in USUAL),
-            *(
-                (f"claim, {verdict}", text, "claims")
-                for text, verdict in (*each.claims, *each.questions)
-            ),
+            *((f"claim, {verdict}", text, "claims") for text, verdict in judged),
             *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
         ]
         search += [
@@ -332,12 +330,11 @@ def site(
         paper.name: [r for r in found if paper.has(r.experiment) and not r.is_comparison]
         for paper in papers
     }
-    of_papers = {each.folder for several in owned.values() for each in several}
-    others = [each for each in found if each.folder not in of_papers]
-    drawn = {each.experiment for each in others if not each.is_comparison}
+    others = [each for each in found if not any(each in several for several in owned.values())]
     names = {name for paper in papers for name in paper.experiments}
     elsewhere = {name for name in names if not any(paper.has(name) for paper in papers)}
     arenas = [each for each in others if not each.is_comparison]
+    drawn = {each.experiment for each in arenas}
     groups: tuple[tuple[str, list[ReportSummary], list[str]], ...] = (
         ("Arenas and other experiments", arenas, sorted(elsewhere - drawn)),
         ("Comparisons", [each for each in others if each.is_comparison], []),
@@ -355,11 +352,32 @@ def site(
     }
 
 
+def _judged_once(paper: Paper, reports: Sequence[ReportSummary]) -> Iterator[ReportSummary]:
+    """Yield reports with the claims that none before judges, on the same runs or in one sentence.
+
+    The page of readings comes first: what it judges counts there alone.
+    """
+    readings = f"{paper.name}_claims"
+    order = list(dict.fromkeys((readings, *paper.claims, *(each.folder for each in reports))))
+    known, judged = set[str](), dict[str, set[str]]()  # sentences; rule → the runs it is judged on
+    every = {name for each in reports for name, _ in each.runs}
+    for each in sorted(reports, key=lambda report: order.index(report.folder)):
+        rules, runs = dict(each.rules), {name for name, _ in each.runs}
+        told = [text for text, _ in (*each.claims, *each.questions)]
+        new = {text for text in told if runs - judged.get(rules.get(text, text), set())} - known
+        claims = tuple(claim for claim in each.claims if claim[0] in new)
+        questions = tuple(claim for claim in each.questions if claim[0] in new)
+        yield each._replace(claims=claims, questions=questions)
+        known |= new
+        for rule in rules.values():
+            judged.setdefault(rule, set()).update(every if each.folder == readings else runs)
+
+
 def _card(paper: Paper, reports: Sequence[ReportSummary]) -> dict[str, Any]:
     """Return the card of a paper; its claims are those of whole experiments, not of variants."""
     whole = [each for each in reports if each.folder == each.experiment]
     drawn, shown = {each.folder for each in whole}, {each.experiment for each in reports}
-    names = (*paper.experiments, *paper.claims)
+    names, judged = (*paper.experiments, *paper.claims), list(_judged_once(paper, whole))
     return {
         "paper": paper,
         # the report whose figure is shown
@@ -369,8 +387,8 @@ def _card(paper: Paper, reports: Sequence[ReportSummary]) -> dict[str, Any]:
             default=None,
         ),
         "tallies": tallies(
-            [claim for each in whole for claim in each.claims],
-            [claim for each in whole for claim in each.questions],
+            [claim for each in judged for claim in each.claims],
+            [claim for each in judged for claim in each.questions],
         ),
         # claims of experiments without a report at the paper's budget
         "unjudged": sum(count for name, count in paper.claims.items() if name not in drawn),

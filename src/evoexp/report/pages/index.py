@@ -12,6 +12,7 @@ from evoexp.report.results.parameters import Parameter, parameters, planned_repl
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Comparison
 from evoexp.report.statistics.inference import Proportion
+from evoexp.shipped import config_directory, described
 
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
@@ -54,7 +55,7 @@ def document(
         results.experiment,
         results.budget,
         tuple(_notices(results)),
-        page.introduction,
+        " ".join(filter(None, (_asked(page, results.experiment), page.introduction))),
         above,
         tuple(
             each._replace(caption=f"{each.caption} {provenance(each.conditions)}".strip())
@@ -68,11 +69,19 @@ def document(
     )
 
 
+def _asked(page: Page, experiment: str) -> str:
+    """Return the description of a shipped experiment whose page has but its name as title."""
+    if not experiment or experiment not in page.title:
+        return ""
+    text = described(config_directory() / "experiment" / f"{experiment}.yaml")
+    return text.partition("; then: ")[0].rstrip(".") + "." * bool(text)
+
+
 def _verdict(claim: Claim) -> Verdict:
     number = f"n = {claim.n}" if claim.n not in ("", "–") else ""
     if claim.size is not None:
         number = f"{claim.size.name} {claim.size.value:.3g}"
-    return Verdict(claim.verdict, number, claim.source.startswith(OUR_QUESTION))
+    return Verdict(claim.verdict, number, claim.source.startswith(OUR_QUESTION), claim.name)
 
 
 def _numbered(tables: Iterable[Table], first: int) -> tuple[Table, ...]:
@@ -120,7 +129,10 @@ def provenance(conditions: Sequence[ConditionResults]) -> str:
 
 
 def _notices(results: Results) -> Iterator[tuple[str, str]]:
-    """Yield the remarks on replicates that are missing, cannot be read or were added."""
+    """Yield the remarks on smoke runs, and on replicates that are missing, unreadable or added."""
+    if results.budget == "smoke":
+        text = "It shows that everything works; nothing can be concluded from its numbers."
+        yield "A smoke run", text
     fixed = planned_replicates(results) if results.experiment else 0
     missing, lost, added = list[str](), list[str](), list[str]()
     for c in results.conditions:
@@ -132,21 +144,14 @@ def _notices(results: Results) -> Iterator[tuple[str, str]]:
             lost.append(f"{c.label}: {len(c.damaged)} ({', '.join(names)})")
         if count := c.added(c.condition.num_replicates(fixed)):
             added.append(f"{c.label}: {count} of {c.done}")
-    if missing:
-        text = f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
-        yield "Partial results", text
-    if lost:
-        text = (
-            f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
-            "experiment runs them again."
-        )
-        yield "Damaged logs", text
-    if added:
-        text = (
-            f"{'; '.join(added)}: asked for when results of earlier ones were stored already. "
-            "Numbers and verdicts below use all of them."
-        )
-        yield "Replicates added later", text
+    remarks = {
+        "Partial results": (missing, ". Everything below is drawn from the finished replicates."),
+        "Damaged logs": (lost, " could not be read and are left out; run the experiment again."),
+        "Replicates added later": (added, ": added to stored results, and used below."),
+    }
+    for title, (own, end) in remarks.items():
+        if own:
+            yield title, "; ".join(own) + end
 
 
 def _table(

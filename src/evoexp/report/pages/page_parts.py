@@ -70,6 +70,7 @@ class Verdict(NamedTuple):
     text: str  # such as "reproduced", or "not judged (budget smoke)"
     number: str = ""  # that decides it, with its name; empty: there is none
     is_ours: bool = False  # whether the claim is a question of ours, no sentence of the paper
+    rule: str = ""  # name of the claim's rule
 
     def __str__(self) -> str:
         """Return the verdict as Markdown."""

@@ -12,7 +12,7 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
 from evoexp.report.statistics.inference import Effect, effect, holm, quantile, runs_for_effect
 
-Values = Callable[[ConditionResults], FloatArray]
+Values = Callable[[ConditionResults], FloatArray]  # a measure: a number per run, (done,)
 Pair = tuple[ConditionResults, ConditionResults]
 
 

@@ -66,8 +66,8 @@ def draw_arms(table: pd.DataFrame) -> Figure:
         s, c = sincos(DEGREE * (reference + 0.5 * angle))
         text = f"{style.joint_symbol(row.arm, row.joint)} = {angle:g}°"
         place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
-        look: dict[str, Any] = {"va": "center", "color": colour, "zorder": 6}
-        axes.annotate(text, place, ha="left" if c >= 0 else "right", **look)
+        look: dict[str, Any] = {"color": colour, "zorder": 10, "path_effects": marks.HALO}
+        axes.annotate(text, place, ha="left" if c >= 0 else "right", va="center", **look)
         if row.joint == 0:
             marks.write(axes, f"arm {row.arm + 1}", (x, y), (0, -22), color=colour)
     keys = [style.key(name, color=style.NEUTRAL, **look) for name, look in looks.items()]

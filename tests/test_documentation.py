@@ -202,12 +202,13 @@ def readers_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 ONE_OF_MANY = {  # conditions: tests/test_shipped.py runs every one of them
     "experiment=arena_papers": "rana_planar · GA",
-    "experiment=arena_tuning": "curkovic_b · GA, walk step 3.0",
+    "experiment=arena_tuning": "curkovic_b",
 }
 
 
 def shortened(words: list[str]) -> list[str]:
     """Return a command with which a long run is over in seconds."""
+    words = [*words, "sweep.num_trials=1"] if "sweep=optuna" in words else words
     is_long = words[0] == "run" and not {"experiment=rana_planar", "-m"} & set(words)
     if is_long and not any(word.startswith("budget=") for word in words):
         names = [ONE_OF_MANY[word] for word in words if word in ONE_OF_MANY]

@@ -20,7 +20,7 @@ from rich.console import Console
 import evoexp.batch.jobs as jobs_module
 from evoexp import load
 from evoexp.batch.jobs import NUM_POINTS, CurveFile, Outcome, read_curves
-from evoexp.commands.run import MOST_ROWS, BatchProgress, drawn
+from evoexp.commands.batch_progress import MOST_ROWS, BatchProgress, drawn
 from evoexp.configuration import compose
 from evoexp.records import Block, Generation
 from evoexp.store.run_directory import RunDirectory
@@ -133,9 +133,10 @@ def test_several_experiments_share_a_batch_and_a_condition_runs_once(
 def test_the_manifest_holds_a_command_that_runs_it_again(evoexp: Evoexp, outputs: Path) -> None:
     label = "random search · seed=1"
     swept = ("num_replicates=1", "-m", "seed=0,1", "--only", label, "--no-report")
-    assert evoexp("run", *PLANAR, *swept).code == 0
+    assert evoexp("run", *PLANAR, *swept, "runner.address=tcp://host:1").code == 0
     (run,) = find_runs(outputs)
     manifest = run.manifest()
+    assert "host" not in manifest["command"]
     assert (manifest["experiment"], manifest["label"]) == ("rana_planar", label)
     words = shlex.split(manifest["command"])
     assert words[:2] == ["evoexp", "run"]

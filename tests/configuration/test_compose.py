@@ -3,7 +3,6 @@
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import hydra
 import pytest
@@ -65,8 +64,7 @@ def test_settings_are_as_hydra_itself_sets_them(words: tuple[str, ...]) -> None:
         by_hydra = OmegaConf.to_container(hydra.compose("config", overrides=[*words]))
     chosen = collect(map(compose.parse, words))
     experiment = find("experiment", chosen.pop("experiment").typed)
-    with TemporaryDirectory() as root:
-        options = compose.Composer(Path(root), experiment).chosen(chosen)
+    options = compose.Composer(experiment).chosen(chosen)
     assert assigned(options.config, chosen) == by_hydra
 
 

@@ -114,4 +114,4 @@ def test_rows_that_need_the_package_are_skipped_with_a_note(
     assert "skipped: rana_planar · BIT* (OMPL): ompl needs pip install 'evoexp[baselines]'" in said
     assert len(list((tmp_path / "runs").iterdir())) == 1
     assert main(["run", *given, "--only", "rana_planar · BIT* (OMPL)"]) == 2
-    assert "evoexp: planner: must be installed: ompl needs" in capsys.readouterr().err
+    assert "evoexp: planner: must be one that is installed: ompl needs" in capsys.readouterr().err

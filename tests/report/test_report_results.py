@@ -200,7 +200,7 @@ def test_every_number_of_the_shipped_experiments_has_a_source(name: str) -> None
     assert len(numbers) > 20
     assert [row.name for row in numbers if not row.source] == []
     # what their first conditions are there for
-    swept = {"curkovic_hall": ["ga.hall_depth"], "arena_tuning": ["planner.walk_step"]}
+    swept = {"curkovic_hall": ["ga.hall_depth"]}
     assert overridden(rows.values()) == swept.get(name, [])
 
 

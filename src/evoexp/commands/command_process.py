@@ -36,7 +36,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 from evoexp.batch.replicate_limits import allowed_addresses
-from evoexp.errors import DamagedStore, printable
+from evoexp.errors import Notice, printable
 from evoexp.numeric.cache_folder import remove_at_exit
 
 OUTPUT = "standard output"  # the file name of its errors
@@ -143,20 +143,20 @@ def complain(text: str) -> None:
 
 
 @contextlib.contextmanager
-def damage_in_lines() -> Iterator[None]:
-    """Print warnings of damaged files as `evoexp: …`, each line once, while the body runs."""
+def notices_in_lines() -> Iterator[None]:
+    """Print notices as `evoexp: …`, each line once, while the body runs."""
     said: set[str] = set()
     with warnings.catch_warnings():
         shown = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
-            if not issubclass(category, DamagedStore):
+            if not issubclass(category, Notice):
                 shown(message, category, *place, **rest)
             elif (text := " ".join(str(message).split())) not in said:
                 said.add(text)
                 print(f"evoexp: {printable(text)}", file=sys.stderr)
 
-        warnings.simplefilter("always", DamagedStore)
+        warnings.simplefilter("always", Notice)
         warnings.showwarning = show
         yield
 

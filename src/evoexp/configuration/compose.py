@@ -7,10 +7,12 @@ the chosen options; settings are assigned to copies of these (see `overrides`).
 
 import contextlib
 import itertools
+import math
 import os
 import re
 import shutil
 import tempfile
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -29,8 +31,17 @@ from evoexp.configuration import overrides as syntax
 from evoexp.configuration import search_path
 from evoexp.configuration.building import build_settings, fill_in, planned_replicates
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
-from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
-from evoexp.configuration.overrides import ADD, DELETE, NOT_IDENTITY, SCALARS, Choice, Override
+from evoexp.configuration.experiment import Budget, Built, Experiment
+from evoexp.configuration.overrides import (
+    ADD,
+    DELETE,
+    NOT_IDENTITY,
+    SCALARS,
+    SWEEP,
+    Choice,
+    Override,
+    Span,
+)
 from evoexp.configuration.search_path import EXPERIMENT, chosen, find, groups, is_file, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.input_files import MEGABYTE, read_bounded
@@ -62,13 +73,15 @@ def expand(
         only: Labels to keep; empty keeps all.
     """
     given = syntax.collect(map(parse, overrides))
-    syntax.refuse_sweeps(given, multirun=multirun)
-    asked = given.pop(EXPERIMENT, None)
+    space = syntax.search_space(given)
+    rest = {key: each for key, each in given.items() if key not in space}
+    syntax.refuse_sweeps(rest, multirun=multirun or bool(space))
+    asked = rest.pop(EXPERIMENT, None)
     names = [each.option() for each in syntax.single_values(asked)] if asked else [None]
     files = [None if name is None else find(EXPERIMENT, name) for name in names]
     if len({file and file.name for file in files}) < len(files):
         raise SettingError(EXPERIMENT, "names that differ", ",".join(map(str, names)))
-    return [_expand_one(file, given, only) for file in files]
+    return [_expand_one(file, rest, only, space) for file in files]
 
 
 def parse(text: str) -> Override:
@@ -83,7 +96,11 @@ def parse(text: str) -> Override:
         key, texts = found.key_or_group, [typed]
         if not key or found.package is not None:
             raise SettingError("override", "key=value", text)
-        if found.is_sweep_override():
+        span = None
+        if found.is_interval_sweep():
+            span = _span(key, found.value(), typed)
+            texts = [str(span.low), str(span.high)]
+        elif found.is_sweep_override():
             if found.value_type not in _SWEEPS:
                 must = "values that can be enumerated: a,b,c or range(…)"
                 raise SettingError(key, must, texts[0])
@@ -93,7 +110,26 @@ def parse(text: str) -> Override:
         raise unparsed(text) from None
     is_bare = found.value_type is None  # a deletion
     values = () if is_bare else tuple(map(syntax.Value, texts, map(_with_text_keys, data)))
-    return Override(_PREFIXES.get(found.type, ""), key, values, found.is_sweep_override(), text)
+    if found.is_range_sweep():
+        span = _of_range(values, found.value())
+    prefix = _PREFIXES.get(found.type, "")
+    return Override(prefix, key, values, found.is_sweep_override(), text, span)
+
+
+def _span(key: str, interval: Any, typed: str) -> Span:
+    low, high, is_log = interval.start, interval.end, "log" in interval.tags
+    if key in groups() or not -math.inf < low < high < math.inf or (is_log and low <= 0):
+        must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
+        raise SettingError(key, must, typed)
+    return Span(low, high, 1 if isinstance(low, int) else None, is_log)
+
+
+def _of_range(values: Sequence[syntax.Value], sweep: Any) -> Span | None:
+    """Return the span of the numbers of a range, whatever their order."""
+    numbers = [value.data for value in values]
+    if len(numbers) < 2:
+        return None
+    return Span(min(numbers), max(numbers), abs(sweep.step), is_interval=False)
 
 
 def _with_text_keys(value: Any) -> Any:
@@ -108,11 +144,13 @@ class Composer:
     Hydra could apply settings, too, but takes a tenth of a second, and reaches none in a list.
     """
 
-    def __init__(self, root: Path, file: Option | None) -> None:
+    def __init__(self, file: Option | None) -> None:
         """Begin with the root configuration, in an empty folder that is searched first.
 
         Of a user's folders only the options count.
         """
+        root = Path(tempfile.mkdtemp())
+        weakref.finalize(self, shutil.rmtree, root, ignore_errors=True)
         self.root, self.file = root, file
         self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options
         shutil.copy(shipped.config_directory() / "config.yaml", root)
@@ -174,22 +212,28 @@ def _quoted(text: str) -> str:
     return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
-def _expand_one(file: Option | None, overrides: Choice, only: Sequence[str]) -> Experiment:
-    with tempfile.TemporaryDirectory() as root:
-        compose = Composer(Path(root), file)
-        base, builder = _builder(compose, overrides)
-        built = builder.build_all(overrides, only)
-        return Experiment(
-            builder.name,
-            builder.budget.name,
-            tuple(Labelled(label, each.condition) for label, each in built.items()),
-            planned_replicates(base["num_replicates"], builder.budget),
-            build_settings(RunnerSettings, base["runner"], "runner"),
-            build_settings(ReportSettings, base["report"], "report"),
-            _is_changed(compose, overrides, only, built),
-            {label: each.options for label, each in built.items()},
-            tuple(label for label, each in built.items() if each.is_capped),
-        )
+def _expand_one(
+    file: Option | None, overrides: Choice, only: Sequence[str], space: Choice
+) -> Experiment:
+    compose = Composer(file)
+    base, builder = _builder(compose, overrides)
+    built = builder.build_all(overrides, only)
+    experiment = Experiment(
+        builder.name,
+        builder.budget.name,
+        planned_replicates(base["num_replicates"], builder.budget),
+        build_settings(RunnerSettings, base["runner"], "runner"),
+        build_settings(ReportSettings, base["report"], "report"),
+        _is_changed(compose, overrides, only, built),
+    ).of(built)
+    if not space:
+        return experiment
+    from evoexp.configuration.setting_search import SearchSettings, with_search  # pandas
+
+    settings = build_settings(SearchSettings, base[SWEEP], SWEEP)
+    return with_search(
+        experiment, settings, space, lambda chosen: builder.build_all({**overrides, **chosen}, only)
+    )
 
 
 def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Builder]:

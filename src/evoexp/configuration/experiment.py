@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, Field
 
@@ -11,6 +11,9 @@ from evoexp.condition import LARGEST_CAP, Condition
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 from evoexp.validation import Count, Settings
+
+if TYPE_CHECKING:
+    from evoexp.configuration.setting_search import Search
 
 
 def _whole(value: Any) -> Any:
@@ -53,25 +56,36 @@ class Experiment(NamedTuple):
 
     name: str  # of the experiment file; "custom" without one
     budget: str  # name of the budget
-    conditions: tuple[Labelled, ...]  # in the order of the file, each condition once
     num_replicates: int  # of every condition, but for references (`Condition.num_replicates`)
     runner: RunnerSettings  # how to run them
     report: ReportSettings  # how to report them
     # whether overrides or `--only` make this another set of conditions than the file's own
     changed: bool
+    conditions: tuple[Labelled, ...] = ()  # in the order of the file, each condition once
     # label → the option that was taken of each group, the experiment file included. No part of
     # any identity: the same settings may come from other options.
-    options: Mapping[str, tuple[Option, ...]]
-    capped: tuple[str, ...]  # labels of the conditions that the budget changed
+    options: Mapping[str, tuple[Option, ...]] = {}
+    capped: tuple[str, ...] = ()  # labels of the conditions that the budget changed
+    search: "Search | None" = None  # of settings, of which the conditions are the finished trials
 
     @property
     def report_name(self) -> str:
         """Directory of its report: `<experiment>[@budget][+hash of what was changed]`."""
+        if self.search is not None:
+            return self.search.folder.name
         name = self.name if self.budget == PAPER else f"{self.name}@{self.budget}"
         if not self.changed:
             return name
         text = "\n".join(f"{label}\t{condition.id}" for label, condition in self.conditions)
         return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+    def of(self, conditions: Mapping[str, Built]) -> "Experiment":
+        """Return the experiment with other conditions, by their labels."""
+        return self._replace(
+            conditions=tuple(Labelled(label, b.condition) for label, b in conditions.items()),
+            options={label: built.options for label, built in conditions.items()},
+            capped=tuple(label for label, built in conditions.items() if built.is_capped),
+        )
 
     def budget_of(self, label: str) -> str:
         """Return the budget of a condition: `paper` if no cap changed it, whatever is asked for."""

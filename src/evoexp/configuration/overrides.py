@@ -22,12 +22,15 @@ ADD, FORCE, DELETE = "+", "++", "~"  # prefixes of an override; without one it s
 JOIN = " · "  # between the parts of a label
 PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner takes in by interpolation
 AROUND = ("control", "reference")  # groups whose option is put around the chosen planner
-OPTIONAL = (EXPERIMENT, *AROUND, *PLANNER_PARTS)  # groups that a configuration may do without
-NOT_IDENTITY = (EXPERIMENT, "budget", "num_replicates", "runner", "report")
+SWEEP = "sweep"  # the group that has settings searched
+SEARCHED = ("planner", "ga", "control")  # groups whose swept settings are searched
+# groups that a configuration may do without
+OPTIONAL = (EXPERIMENT, SWEEP, *AROUND, *PLANNER_PARTS)
+NOT_IDENTITY = (EXPERIMENT, "budget", "num_replicates", "runner", "report", SWEEP)
 SCALARS = ("seed", "num_replicates")  # settings outside the groups
 HYDRAS_OWN = {
     "launcher": "runner=serial, loky or dask",
-    "sweeper": "evoexp run -m sweeps",
+    "sweeper": "evoexp run -m crosses all values, sweep=optuna searches them",
     "run": "EVOEXP_OUTPUTS names the folder",
     "sweep": "EVOEXP_OUTPUTS names the folder",
     "job_logging": "results go to outputs, nothing else is logged",
@@ -43,14 +46,26 @@ class Value(NamedTuple):
     data: Any  # as plain data
 
 
+class Span(NamedTuple):
+    """Numbers that a search may choose from: whole ones if the ends are."""
+
+    low: float
+    high: float
+    step: float | None = None  # between two of them; None: any number
+    is_log: bool = False  # whether it searches by orders of magnitude
+    is_interval: bool = True  # not of values that can be enumerated
+
+
 class Override(NamedTuple):
     """A change of a configuration."""
 
     prefix: str  # `ADD`, `FORCE`, `DELETE`, or empty
     key: str  # a group, or the dotted path of a setting
-    values: tuple[Value, ...]  # one value, several if they are swept over, none of a deletion
+    # one value, several if they are swept over, none of a deletion; of an interval its ends
+    values: tuple[Value, ...]
     is_swept: bool  # whether the values are swept over
     text: str  # as it was typed
+    span: Span | None = None  # of swept numbers
 
     @property
     def root(self) -> str:
@@ -124,14 +139,36 @@ def _check_setting(override: Override) -> None:
 def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
     """Refuse overrides that are swept over but may not be."""
     for key, override in overrides.items():
+        if override.span is not None and override.span.is_interval:
+            must = "values that can be enumerated: a,b,c or range(…) (or searched by sweep=optuna)"
+            raise SettingError(key, must, override.typed)
         if override.is_swept and not multirun:
             raise SettingError(key, "one value (or add -m to sweep over several)", override.typed)
         if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
             must = "one value: only settings of a condition can be swept"
             raise SettingError(key, must, override.typed)
+    refuse_equal_values(overrides)
+
+
+def refuse_equal_values(overrides: Choice) -> None:
+    """Refuse overrides that are swept over one value twice."""
+    for key, override in overrides.items():
         texts = [value.text for value in override.values]
         if key != EXPERIMENT and len(set(texts)) < len(texts):
             raise SettingError(key, "values that differ", override.typed)
+
+
+def search_space(overrides: Choice) -> Choice:
+    """Return the overrides that a search chooses values of; none without `sweep=…`."""
+    if SWEEP not in overrides or overrides[SWEEP].option() is None:
+        return {}
+    swept = {key: override for key, override in overrides.items() if override.is_swept}
+    space = {key: override for key, override in swept.items() if override.root in SEARCHED}
+    if not space:
+        must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
+        raise SettingError(SWEEP, must, " ".join(each.text for each in swept.values()))
+    refuse_equal_values(space)
+    return space
 
 
 def single_values(override: Override) -> Iterator[Override]:

@@ -27,6 +27,7 @@ from evoexp.report.pages.page_parts import Document, Drawing, Page, Table
 from evoexp.report.pages.page_values import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.results.trials import Searched
 from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
@@ -49,6 +50,7 @@ class Request(NamedTuple):
     # Label → the options that were taken; None: the options in the runs' manifests
     options: Mapping[str, tuple[Option, ...]] | None = None
     command: str = "report"  # that draws it
+    searched: Searched | None = None  # the trials, if the conditions are those of a search
 
     @property
     def words(self) -> str:
@@ -67,7 +69,7 @@ class Request(NamedTuple):
         """Read the stored results, see `gather`."""
         words = self.experiment, self.budget, self.hint
         results = gather(outputs, self.conditions, self.num_replicates, *words, self.options)
-        return results._replace(as_written="+" not in self.report_name)
+        return results._replace(as_written="+" not in self.report_name, searched=self.searched)
 
     def files(self, outputs: Path) -> "ReportFiles":
         """Draw the report as it follows from the outputs; nothing is written."""

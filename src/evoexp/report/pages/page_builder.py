@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, cast
 
-from evoexp.report.pages import page_parts, swept
+from evoexp.report.pages import page_parts, searched, swept
 from evoexp.report.pages.judged_claims import Headline, judged_as_written
 from evoexp.report.pages.page_file import PageFile, Scope, own_pages, read_page_file
 from evoexp.report.pages.page_parts import Claim, Drawing, Page, Quantity, Table, quantity
@@ -24,6 +24,10 @@ Entry = Mapping[str, Any]
 def page_of(results: Results, settings: ReportSettings) -> Page:
     """Return the page that the settings name, filled from results; sweeps have their own."""
     chosen = page_registration(settings)
+    if results.searched is not None:
+        motions = best_motions(searched.best_of(results))
+        given = {"searched": results.searched, "best_motions": motions}
+        return own_page("search", results, settings, **given)
     if sweep := sweep_of(results):
         motions = best_motions(swept.best_condition(sweep, results))
         return own_page("sweep", results, settings, sweep=sweep, best_motions=motions)

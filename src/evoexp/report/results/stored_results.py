@@ -198,6 +198,7 @@ class Results(NamedTuple):
     conditions: tuple[ConditionResults, ...]  # in the order of the experiment
     outputs: Path = Path()  # root of the outputs that they were read from
     as_written: bool = False  # whether the experiment was asked for without overrides
+    searched: Any = None  # the trials of a search of settings (`trials.Searched`)
 
     @property
     def with_data(self) -> tuple[ConditionResults, ...]:

@@ -1,0 +1,315 @@
+"""Searches of settings, `sweep=optuna`: Optuna proposes values, trial by trial (ask and tell).
+
+A swept setting of planner, operators or control is searched; what describes the problem is crossed
+as in any sweep. The study lies beside the runs, `searches/<report>/journal.log`, and is resumed by
+the same command. A proposal depends on the finished trials and the seed alone: an interrupted
+search goes on as an undisturbed one.
+"""
+
+import contextlib
+import functools
+import hashlib
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from filelock import FileLock, Timeout
+
+from evoexp.configuration.experiment import Built, Experiment
+from evoexp.configuration.overrides import SWEEP, Choice, Override, Value
+from evoexp.errors import Busy, EvoexpError, SettingError, StoreError, brief
+from evoexp.report.results.stored_results import gather
+from evoexp.report.results.trials import Searched, Trial, score_table
+from evoexp.store.run_directory import outputs_root
+from evoexp.validation import Count, NonNegativeCount, Positive, Settings
+
+DIGITS = 4  # of a number that is proposed: as many as one types
+REFUSED = "refused"  # attribute of a trial whose settings do not go together: why
+FEWEST = 10  # trials from which on the importance of settings is told
+BEST = 5  # trials that are told from all others for it, a tenth of many (Optuna's advice)
+
+
+class SearchSettings(Settings):
+    """Settings of `conf/sweep`."""
+
+    num_trials: Count  # beside the experiment as it is; those already finished count
+    num_at_once: Count  # trials that are asked for together and run side by side
+    sampler: Literal["tpe", "random"]  # of Optuna
+    unsolved: Positive  # score of a run without a proven answer, see `score_table`
+    seed: NonNegativeCount  # of the sampler
+
+
+class Asked(NamedTuple):
+    """A trial that Optuna asks for."""
+
+    trial: Trial
+    conditions: dict[str, Built]  # by label; none if it is refused
+    study_number: int  # which counts interrupted trials, too
+    refusal: str = ""  # why its settings do not go together
+
+
+class Search:
+    """A search of the settings of one experiment.
+
+    `base` are the experiment's own conditions, by label, as far as the searched settings change
+    them: the problems.
+    """
+
+    def __init__(
+        self,
+        settings: SearchSettings,
+        space: Choice,
+        num_replicates: int,
+        folder: Path,
+        build: Callable[[Choice], dict[str, Built]],
+    ) -> None:
+        """Try the ends and a middle of every setting; the study need not be there.
+
+        Args:
+            settings: How to search.
+            space: Searched overrides by key, each with its values or its span.
+            num_replicates: Replicates of every condition.
+            folder: Where the study lies.
+            build: Returns conditions by label, those of the same problems in the same order, of
+                overrides that are added.
+
+        Raises:
+            EvoexpError: If a value is refused.
+        """
+        self.settings, self.space, self.folder = settings, space, folder
+        self.num_replicates, self._build = num_replicates, build
+        own = build({})
+        self._own = [each.condition.id for each in own.values()]
+        changed = set[int]()
+        for key, override in space.items():
+            for value in _probes(override):
+                ids = [each.condition.id for each in self._built({key: value}).values()]
+                changed |= {k for k, own_id in enumerate(self._own) if ids[k] != own_id}
+        if not changed:
+            raise SettingError(SWEEP, "beside values that change a condition", " ".join(space))
+        self._changed = sorted(changed)
+        self.base = dict(each for k, each in enumerate(own.items()) if k in changed)
+
+    def _built(self, values: Mapping[str, Value]) -> dict[str, Built]:
+        """Return all conditions under values of some settings."""
+        choice = {
+            key: self.space[key]._replace(values=(value,), span=None, text=f"{key}={value.text}")
+            for key, value in values.items()
+        }
+        built = self._build(choice)
+        if values and len(built) != len(self._own):
+            must = "a setting in which the conditions of the experiment do not differ (see --only)"
+            raise SettingError(next(iter(values)), must, ", ".join(v.text for v in values.values()))
+        return built
+
+    def _trial(self, number: int, params: Mapping[str, Any]) -> tuple[Trial, dict[str, Built]]:
+        """Return a trial, `number` among the finished ones, and its conditions by label."""
+        values = {key: _value(override, params[key]) for key, override in self.space.items()}
+        every = list(self._built(values).items())
+        built = dict(every[k] for k in self._changed)
+        ids = tuple(each.condition.id for each in built.values())
+        return Trial(number, self._texts(params), ids), built
+
+    def _texts(self, params: Mapping[str, Any]) -> dict[str, str]:
+        return {key: _value(each, params[key]).text for key, each in self.space.items()}
+
+    @property
+    def journal(self) -> Path:
+        """The file of the study."""
+        return self.folder / "journal.log"
+
+    @functools.cached_property
+    def study(self) -> Any:
+        """The study as it is stored; None if there is none."""
+        return self._opened(_optuna().load_study) if self.journal.exists() else None
+
+    def _opened(self, study: Callable[..., Any], **how: bool) -> Any:
+        optuna = _optuna()
+        backend = optuna.storages.journal.JournalFileBackend(str(self.journal))
+        try:
+            storage = optuna.storages.JournalStorage(backend)
+            return study(storage=storage, study_name=self.folder.name, **how)
+        except KeyError:  # the journal has no whole line
+            return None
+        except (ValueError, LookupError, TypeError, AssertionError) as error:
+            remedy = "delete it: the same trials are proposed again, their runs are kept"
+            reason = brief(str(error), 80)
+            raise StoreError(f"{self.journal}: is damaged ({reason}); {remedy}") from None
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold the study for writing; trials that an earlier process did not finish are given up.
+
+        `Busy` is raised where another process holds it.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with FileLock(self.folder / ".lock", timeout=0):
+                self._cut()
+                self.study = self._opened(_optuna().create_study, load_if_exists=True)
+                for trial in self.study.get_trials(deepcopy=False):
+                    if not trial.state.is_finished():
+                        self.study.tell(trial.number, state=_optuna().trial.TrialState.FAIL)
+                yield
+        except Timeout:
+            raise Busy(f"{self.folder}: another process goes on with this search now") from None
+
+    def _cut(self) -> None:
+        """Cut off a line of the journal that a process did not finish writing."""
+        if self.journal.exists():
+            content = self.journal.read_bytes()
+            os.truncate(self.journal, content.rfind(b"\n") + 1)
+
+    def _finished(self) -> list[Any]:
+        """Return the trials of the study that have a score, or were refused."""
+        states = _optuna().trial.TrialState
+        finished = {"deepcopy": False, "states": (states.COMPLETE, states.PRUNED)}
+        return [] if self.study is None else list(self.study.get_trials(**finished))
+
+    def ask(self) -> list[Asked]:
+        """Return the next trials; none if all are finished. Refused ones are finished at once."""
+        optuna, asked = _optuna(), list[Asked]()
+        distributions = {key: _distribution(override) for key, override in self.space.items()}
+        done, at_once = len(self._finished()), self.settings.num_at_once
+        for number in range(done + 1, min(done + at_once, self.settings.num_trials) + 1):
+            self.study.sampler = self._sampler(number)
+            trial = self.study.ask(distributions)
+            try:
+                own, conditions = self._trial(number, trial.params)
+                for built in conditions.values():
+                    built.condition.prepare()  # refuses what does not go together
+                asked.append(Asked(own, conditions, trial.number))
+            except EvoexpError as error:
+                own = Trial(number, self._texts(trial.params), ())
+                asked.append(Asked(own, {}, trial.number, str(error)))
+                trial.set_user_attr(REFUSED, str(error))
+                self.study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+        return asked
+
+    def _sampler(self, number: int) -> Any:
+        """Return a sampler whose proposal depends on nothing but finished trials and a number."""
+        samplers = _optuna().samplers
+        seed = int(np.random.SeedSequence((self.settings.seed, number)).generate_state(1)[0])
+        if self.settings.sampler == "random":
+            return samplers.RandomSampler(seed=seed)
+        return samplers.TPESampler(seed=seed, constant_liar=self.settings.num_at_once > 1)
+
+    def tell(self, asked: Asked) -> float:
+        """Judge a trial whose conditions have been run, note its score and return it."""
+        first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
+        every = [*self.base.items(), *asked.conditions.items()]
+        labelled = [(label, built.condition) for label, built in every]
+        found = gather(outputs_root(), labelled, self.num_replicates, self.folder.name, "", "")
+        searched = self._searched((first, asked.trial))
+        table = score_table(searched, {c.condition.id: c for c in found.conditions})
+        score = float(table.loc[table["trial"] > 0, "score"].mean())
+        self.study.tell(asked.study_number, score)
+        return score
+
+    def best(self) -> float:
+        """Return the least score so far; infinite before the first."""
+        scores = (trial.value for trial in self._finished() if trial.value is not None)
+        return min(scores, default=math.inf)
+
+    @functools.cached_property
+    def stored(self) -> list[tuple[Trial, dict[str, Built]]]:
+        """The trials that were finished when this was first asked for, with their conditions."""
+        finished = enumerate(self._finished(), 1)
+        return [self._trial(k, each.params) for k, each in finished if each.value is not None]
+
+    @property
+    def conditions(self) -> dict[str, Built]:
+        """The conditions of the problems and of all stored trials by label, each once."""
+        known = {built.condition.id: label for label, built in self.base.items()}
+        return self.base | {
+            label: built
+            for _, conditions in self.stored
+            for label, built in conditions.items()
+            if known.setdefault(built.condition.id, label) == label
+        }
+
+    def found(self) -> Searched:
+        """Return the trials found so far, with the importance of settings."""
+        first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
+        found = self._searched((first, *(trial for trial, _ in self.stored)))
+        refused = {
+            " ".join(f"{key}={text}" for key, text in self._texts(trial.params).items()): reason
+            for trial in self._finished()
+            if (reason := trial.user_attrs.get(REFUSED))
+        }
+        return found._replace(refused=refused, importance=self._importance())
+
+    def _searched(self, trials: tuple[Trial, ...]) -> Searched:
+        return Searched(tuple(self.base), trials, self.num_replicates, self.settings.unsolved)
+
+    def _importance(self) -> dict[str, float]:
+        """Return the importance of each setting for being among the best trials (PED-ANOVA)."""
+        num_trials = len(self.stored)
+        if num_trials < FEWEST or len(self.space) < 2:
+            return {}
+        importance = _optuna().importance
+        best = max(0.1, BEST / num_trials)
+        evaluator = importance.PedAnovaImportanceEvaluator(target_quantile=best)
+        return dict(importance.get_param_importances(self.study, evaluator=evaluator))
+
+
+def with_search(
+    experiment: Experiment,
+    settings: SearchSettings,
+    space: Choice,
+    build: Callable[[Choice], dict[str, Built]],
+) -> Experiment:
+    """Return an experiment whose conditions are the finished trials of a search, see `Search`."""
+    words = sorted(override.text for override in space.values())
+    own = [condition.id for _, condition in experiment.conditions]
+    # whatever a proposal or a score depends on
+    about = [words, own, experiment.num_replicates, settings.model_dump(exclude={"num_trials"})]
+    plain = experiment._replace(changed=False).report_name
+    name = f"{plain}+{hashlib.sha256(repr(about).encode()).hexdigest()[:8]}"
+    folder = outputs_root() / "searches" / name
+    search = Search(settings, space, experiment.num_replicates, folder, build)
+    return experiment.of(search.conditions)._replace(search=search)
+
+
+def _optuna() -> Any:
+    try:
+        import optuna
+    except ImportError:
+        must = "left out: optuna needs pip install 'evoexp[tuning]'"
+        raise SettingError(SWEEP, must, "optuna") from None
+    optuna.logging.set_verbosity(optuna.logging.WARNING)  # each trial has its line below
+    return optuna
+
+
+def _distribution(override: Override) -> Any:
+    distributions, span = _optuna().distributions, override.span
+    if span is None:
+        return distributions.CategoricalDistribution([value.text for value in override.values])
+    ends: dict[str, Any] = {"low": span.low, "high": span.high, "log": span.is_log}
+    if isinstance(span.low, int):
+        return distributions.IntDistribution(**ends, step=span.step)
+    return distributions.FloatDistribution(**ends, step=span.step)
+
+
+def _value(override: Override, proposed: Any) -> Value:
+    """Return a proposed value as one would type it."""
+    if override.span is None:
+        return next(value for value in override.values if value.text == proposed)
+    if isinstance(proposed, int):
+        return Value(str(proposed), proposed)
+    text = f"{proposed:.{DIGITS}g}"
+    return Value(text, float(text))
+
+
+def _probes(override: Override) -> Iterator[Value]:
+    """Yield values of a setting: all that are listed, or the ends and a middle of a span."""
+    yield from override.values
+    if (span := override.span) is not None:
+        middle = math.sqrt(span.low * span.high) if span.is_log else (span.low + span.high) / 2.0
+        if isinstance(span.low, int):
+            yield _value(override, int(middle))
+        elif span.step is None:
+            yield _value(override, middle)

@@ -1,0 +1,105 @@
+"""The page of a search of settings (`sweep=optuna`), as far as `page.yaml` does not say it."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pandas as pd
+
+from evoexp.report.figures import records
+from evoexp.report.results.stored_results import Results
+from evoexp.report.results.trials import Searched, Trial, score_table
+
+MUCH_MORE = 1.1  # queries of a trial, in those of the experiment as it is
+MOST_ROWS = 10  # trials in the table of the best ones; the data have all
+
+
+def words_of(trial: Trial) -> str:
+    """Return the settings of a trial as one types them."""
+    return " ".join(f"{key}={value}" for key, value in trial.settings.items()) or "as it is"
+
+
+def trial_table(searched: Searched, search_scores: pd.DataFrame) -> pd.DataFrame:
+    """Return the trials in their order.
+
+    Columns trial (0: the experiment as it is), score, best (least score so far, the experiment as
+    it is included), proven and runs (of all problems), queries (mean per run), and one per setting.
+    """
+    by_trial = search_scores.groupby("trial", as_index=False)
+    table = by_trial.agg({"score": "mean", "proven": "sum", "runs": "sum", "queries": "mean"})
+    table.insert(2, "best", table["score"].cummin())
+    for key in searched.trials[-1].settings:
+        table[key] = [trial.settings.get(key, "") for trial in searched.trials]
+    return table
+
+
+def best_trial(searched: Searched, trials: pd.DataFrame) -> Trial:
+    """Return the trial of the least score, the first of equal ones; trial 0 if none is better."""
+    return searched.trials[int(trials["score"].to_numpy().argmin())]
+
+
+def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) -> dict[str, object]:
+    """Return the words of the page's texts."""
+    *others, last = [f"`{key}`" for key in searched.trials[-1].settings] or ["no setting"]
+    rows = {row.trial: row for row in records(trials)}
+    best, own = rows[best_trial.number], rows[0]
+    return {
+        "count": len(searched.trials) - 1,
+        "settings": " and ".join([", ".join(others), last] if others else [last]),
+        "problems": f"{count} problems" if (count := len(searched.problems)) > 1 else "one problem",
+        "replicates": searched.num_replicates,
+        "unsolved": f"{searched.unsolved:g}",
+        "best": f"`{words_of(best_trial)}`",
+        "score": f"{best.score:.3g}",
+        "own": f"{own.score:.3g}",
+        "proven": f"{best.proven} of {best.runs}",
+        "own_proven": f"{own.proven} of {own.runs}",
+    }
+
+
+def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[object, ...]]:
+    """Yield a row for each of the best trials, and for the experiment as it is."""
+    best = trials.sort_values("score", kind="stable").head(MOST_ROWS)
+    for row in records(pd.concat([best, trials[:1]]).drop_duplicates("trial")):
+        words = next(words_of(each) for each in searched.trials if each.number == row.trial)
+        yield (
+            row.trial,
+            f"`{words}`",
+            f"{row.score:.3g}",
+            f"{row.proven} of {row.runs}",
+            f"{row.queries:,.0f}",
+        )
+
+
+def best_trial_by_problem(
+    best_trial: Trial, search_scores: pd.DataFrame
+) -> Iterator[tuple[object, ...]]:
+    """Yield a row per problem: the experiment as it is beside the best trial."""
+    of_trial = search_scores["trial"]
+    own, best = (search_scores[of_trial == number] for number in (0, best_trial.number))
+    for key, one, other in zip(best_trial.ids, records(own), records(best), strict=True):
+        shares = (f"{each.proven} of {each.runs}" for each in (one, other))
+        yield one.problem, f"{one.score:.3g}", f"{other.score:.3g}", *shares, f"`{key[:12]}`"
+
+
+def best_of(results: Results) -> Results:
+    """Return the results of the best trial of a search alone."""
+    searched: Searched = results.searched
+    scores = score_table(searched, {c.condition.id: c for c in results.conditions})
+    ids = best_trial(searched, trial_table(searched, scores)).ids
+    return results._replace(conditions=tuple(c for c in results.with_data if c.condition.id in ids))
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "search_scores": lambda searched, results: score_table(
+        searched, {c.condition.id: c for c in results.conditions}
+    ),
+    "trials": lambda searched, search_scores: trial_table(searched, search_scores),
+    "importance_is_known": lambda searched: bool(searched.importance),
+    "effort_differs": lambda trials: (
+        trials["queries"].max() > MUCH_MORE * trials["queries"].iloc[0]
+    ),
+    "has_trials": lambda searched: len(searched.trials) > 1,
+    "importance": lambda searched: searched.importance,
+    "refused_rows": lambda searched: tuple(searched.refused.items()),
+    "conditions_of_best": lambda results: best_of(results).conditions,
+}

@@ -1,0 +1,67 @@
+"""Searches of settings, `sweep=optuna`: what is proposed, how it is judged, how it goes on."""
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from command_samples import Evoexp
+from filelock import FileLock
+
+from evoexp import load
+from evoexp.configuration.compose import expand
+
+EXPERIMENT = ("experiment=rana_planar", "budget=smoke", "runner=serial", "ga.num_generations=4")
+SPACE = ("ga.population_size=int(interval(7,12))", "ga.num_elites=0,2,9")
+SPACE += ("planner.walk_step=tag(log,interval(0.5,8))", "planner.num_new_trajectories=range(0,3)")
+WORDS = (*EXPERIMENT, *SPACE, "sweep=optuna", "--only", "via-point GA")
+NO_REPORT = ("--no-report",)
+
+
+def trials(text: str) -> list[str]:
+    return re.findall(r"^trial .* · .*$", text.replace(" of 6:", ":").replace(" of 3:", ":"), re.M)
+
+
+def test_a_search_goes_on_as_if_it_had_not_been_interrupted(evoexp: Evoexp, outputs: Path) -> None:
+    half = evoexp("run", *WORDS, "sweep.num_trials=3", *NO_REPORT)
+    rest = evoexp("run", *WORDS, "sweep.num_trials=6", *NO_REPORT)
+    assert half.code == rest.code == 0
+    (folder,) = (outputs / "searches").iterdir()
+    with FileLock(folder / ".lock"):  # as another process holds it
+        busy = evoexp("run", *WORDS, "sweep.num_trials=7", *NO_REPORT)
+    assert busy.code == 2 and "another process goes on with this search now" in busy.err
+    (folder / "journal.log").unlink()
+    whole = evoexp("run", *WORDS, "sweep.num_trials=6")
+    found = trials(whole.out)
+    assert whole.code == 0, whole.err
+    assert found == trials(half.out) + trials(rest.out) and len(found) == 6
+    assert "nothing to run" in whole.out  # its runs are there
+    refused = [line for line in found if "refused: planner.num_new_trajectories: must be" in line]
+    assert 0 < len(refused) < 6, found
+
+    # the page tells the trials, with the scores of a slow and obvious second opinion
+    report = outputs / "reports" / folder.name
+    table = pd.read_csv(report / "search_history.csv").set_index("trial")
+    (as_it_is,) = expand(EXPERIMENT, only=["via-point GA"])
+    own = load(as_it_is.conditions[0].condition.id).summaries
+    for line in sorted(set(found) - set(refused)):
+        number, score, settings = re.match(r"trial (\d+): score (\S+), .* · (.*)$", line).groups()
+        (experiment,) = expand([*EXPERIMENT, *shlex.split(settings)], only=["via-point GA"])
+        mine = load(experiment.conditions[0].condition.id).summaries
+        assert table["score"][int(number)] == pytest.approx(float(score), rel=1e-3)
+        assert np.mean(judged(mine, own)) == pytest.approx(float(score), rel=1e-3)
+    assert table["score"][0] == pytest.approx(np.mean(judged(own, own)))
+    drawn = (report / "search_slices.svg").read_bytes()
+    again = evoexp("report", *WORDS, "sweep.num_trials=6")
+    assert again.code == 0 and (report / "search_slices.svg").read_bytes() == drawn
+
+
+def judged(runs: pd.DataFrame, own: pd.DataFrame) -> list[float]:
+    proven = own[own["solved"] & (own["certified"] == True)]  # noqa: E712
+    reference = (proven if len(proven) else own)["best_cost"].mean()
+    return [
+        min(run.best_cost / reference, 10.0) if run.solved and run.certified is True else 10.0
+        for run in runs.itertuples()
+    ]

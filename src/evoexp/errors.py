@@ -161,4 +161,4 @@ class MotionFileError(EvoexpError):
 
 
 class NothingStored(EvoexpError):
-    """The outputs hold no finished replicate of what was asked for."""
+    """The outputs hold no finished replicate of the requested runs."""

@@ -57,7 +57,7 @@ class Settings(BaseModel):
         """Refuse fields that contradict each other by a SettingError."""
 
     def demand(self, field: str, holds: bool, must: str) -> None:
-        """Refuse these settings by a field of which something does not hold.
+        """Refuse these settings unless a condition on a field holds.
 
         Raises:
             SettingError: If it does not.
@@ -125,9 +125,9 @@ def build(
     Args:
         data: A mapping with `_target_`, or any nesting of mappings, lists and scalars around such
             mappings.
-        lookup: Gives the class of a registered name, whose field its error names.
+        lookup: Returns the class of a registered name; its error names the field.
         field: Dotted path of `data`, for errors.
-        largest: No number may be larger than that, of either sign.
+        largest: Largest absolute value of a number.
     """
     if isinstance(data, Mapping):
         children = {

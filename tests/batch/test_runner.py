@@ -294,6 +294,6 @@ def test_a_stored_cap_is_checked(wrong: bytes) -> None:
 
 
 def test_a_cap_below_the_initial_population_is_one_line() -> None:
-    must = r"budget\.collision_queries: must be at least what the initial population asks for"
+    must = r"budget\.collision_queries: must be at least the queries of the initial population"
     with pytest.raises(SettingError, match=must + r" \(1,000\), was 999"):
         run_replicate(condition("budget.collision_queries=999"), 0)

@@ -43,7 +43,7 @@ def test_a_run_says_what_is_there_and_runs_nothing_twice(
     assert max(map(len, first.out.splitlines())) <= 80
     again = evoexp("run", *PLANAR, "--no-report")
     assert again.code == 0
-    assert again.out.startswith("nothing to run: every replicate is there\n")
+    assert again.out.startswith("nothing to run: every replicate is stored\n")
     assert again.out.split("\n", 1)[1] == first.out[first.out.index("rana_planar@smoke") :]
     assert not (outputs / "reports").exists()
 
@@ -100,10 +100,10 @@ def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture
 
 def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs: Path) -> None:
     words = ("run", *PLANAR, "num_replicates=1", *DRAFT, "--only", "via-point GA")
-    assert "(as it was)" not in evoexp(*words).out
+    assert "(unchanged)" not in evoexp(*words).out
     (page,) = outputs.glob("reports/*/index.md")
     content, drawn = page.read_bytes(), page.stat().st_mtime_ns
-    assert "index.html (as it was)\n" in evoexp(*words).out
+    assert "index.html (unchanged)\n" in evoexp(*words).out
     assert page.stat().st_mtime_ns == drawn
     assert evoexp("report", "--check", *words[1:]).code == 0
     (log,) = outputs.glob("runs/*/replicates/0000.mcap")
@@ -113,10 +113,10 @@ def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs
         lambda: os.utime(log, ns=(1, 1)),
     ):
         change()
-        assert "(as it was)" not in evoexp(*words).out
+        assert "(unchanged)" not in evoexp(*words).out
         assert page.read_bytes() == content
-    assert "(as it was)" in evoexp(*words).out
-    assert "(as it was)" not in evoexp(*words, "report.confidence=0.9").out
+    assert "(unchanged)" in evoexp(*words).out
+    assert "(unchanged)" not in evoexp(*words, "report.confidence=0.9").out
 
 
 def test_several_experiments_share_a_batch_and_a_condition_runs_once(

@@ -295,7 +295,7 @@ def test_obstacles_that_never_act_say_nothing() -> None:
         assert {claim.name for claim in judged if claim.text.startswith("pose: ")} == names
 
 
-MINIMUM = "wall: the search gets stuck in a local minimum, which a sub-goal opens"
+MINIMUM = "wall: the search gets stuck in a local minimum, and a sub-goal leads out of it"
 STUCK = "The search gets stuck at obstacles: the same goals are met without them"
 MET = "wall: goals in work space are met without inverse kinematics"
 

@@ -217,7 +217,7 @@ def test_a_search_toward_places_may_end_without_a_plan() -> None:
 def test_what_cannot_be_asked_of_trees_toward_places_is_refused() -> None:
     planner: Any
     planner, problem = reaching().prepare()
-    with pytest.raises(SettingError, match="one that draws paths one by one"):
+    with pytest.raises(SettingError, match="a planner that draws paths one by one"):
         planner.sample(problem, np.random.default_rng(0), 1)
     with pytest.raises(ValueError, match="a multiple of 7"):
         planner.evaluate(problem, np.zeros(8))

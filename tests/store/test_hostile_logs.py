@@ -87,7 +87,7 @@ def zeros(size: int) -> bytes:
 def test_a_chunk_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     (parts, chunk), size = opened(), 3 * 10**9
     chunk.frame = zeros(size)
-    for told, reason in ((size, "at most"), (1000, "size that it tells")):
+    for told, reason in ((size, "at most"), (1000, "size that it states")):
         chunk.size = told
         bomb = anatomy.put_together(parts)
         assert len(bomb) < 150_000
@@ -199,14 +199,14 @@ def test_an_index_that_points_elsewhere() -> None:
     ):
         refusals = attempt(anatomy.put_together(parts, summary))
         assert len(refusals) == len(READERS)
-        assert all("index does not tell the records" in text for text in refusals)
+        assert all("index does not list the records" in text for text in refusals)
 
 
 def test_a_file_that_is_too_large_or_no_file(tmp_path: Path) -> None:
     path = tmp_path / "0000.mcap"
     with open(path, "wb") as file:
         file.truncate(3 * 10**9)
-    for source, reason in ((path, "larger than 128 MB"), (Path("/dev/zero"), "no regular file")):
+    for source, reason in ((path, "larger than 128 MB"), (Path("/dev/zero"), "not a regular file")):
         for reader in READERS:
             with pytest.raises(CorruptLog, match=reason):
                 reader(source)

@@ -1,6 +1,6 @@
 """A scene: a robot's exact bodies and the obstacles as coal shapes, with the pairs to be watched.
 
-`Scene` holds coal's shapes, which have the last word, and the same bodies as plain arrays, from
+`Scene` holds coal's shapes, which decide, and the same bodies as plain arrays, from
 which the kernels of the certifier bound their distances. It is read-only: one scene serves many
 motions and threads.
 """
@@ -59,7 +59,7 @@ class Scene(NamedTuple):
         return self.names[one], self.names[two]
 
     def of_pairs(self, kept: np.ndarray) -> "Scene":
-        """Return the scene with those of its pairs that are kept, (pairs,)."""
+        """Return the scene with the kept pairs only, (pairs,)."""
         return self._replace(pairs=self.pairs[kept], tolerances=self.tolerances[kept])
 
     def distances(self, q: FloatArray) -> FloatArray:
@@ -70,7 +70,7 @@ class Scene(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A piece of a motion that has bodies of its own: a phase in which something is held, say."""
+    """A piece of a motion with its own bodies, such as a phase in which something is held."""
 
     scene: Scene  # the bodies
     first: int  # instant at which it begins

@@ -19,8 +19,8 @@ CURVE_WIDTH = 16  # characters of a curve
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
 UNSOLVED = "x"
 LIVE_NOTE = (
-    "convergence: best cost so far of the replicate heard last, from its first generation to the "
-    f"one shown, each between its own extremes; {UNSOLVED}: nothing solved yet"
+    "convergence: best cost so far of the replicate that reported last, from its first generation "
+    f"to the one shown, scaled to its own range; {UNSOLVED}: nothing solved yet"
 )
 
 

@@ -85,7 +85,7 @@ def refuse_too_little_memory() -> None:
     """Refuse limits with which libraries or the compiler end the process, or never come back."""
     allowed = allowed_addresses()
     if allowed is not None and allowed < LEAST_MB * MEGABYTE:
-        raise MemoryError(f"a command needs {LEAST_MB:,} MB of addresses at least")
+        raise MemoryError(f"a command needs at least {LEAST_MB:,} MB of address space")
 
 
 def memory_shortage(error: BaseException) -> str:

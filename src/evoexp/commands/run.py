@@ -124,7 +124,7 @@ class Runs:
             if batch.is_damaged:
                 deque(batch.run(), maxlen=0)  # mends what is no replicate
             if told and not batch.num_left_failed:
-                say("nothing to run: every replicate is there")
+                say("nothing to run: every replicate is stored")
             return
         planned = sorted({count for _, count, _ in wanted})
         if told:
@@ -209,7 +209,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
         directory = outputs_root() / "reports" / experiment.report_name
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
-            return f"{directory / 'index.html'} (as it was)"
+            return f"{directory / 'index.html'} (unchanged)"
         from evoexp.commands.report import request_of  # pandas, where there is no need
 
         page = request_of(experiment, *asked).write(outputs_root())
@@ -251,7 +251,7 @@ def summary_table(experiment: Experiment) -> Table:
         named = {"experiment": "", "label": label, "budget": "", "changed": False}
         rows.append(run_row(run.hash12, run) | named | {"planned": run.num_planned(asked)})
         if experiment.budget_of(label) == "smoke":
-            caption = "budget=smoke shows that everything runs; its numbers decide nothing"
+            caption = "budget=smoke checks that everything runs; nothing can be concluded from it"
         if rows[-1]["planned"] > asked:
             count_all = "more are stored, and all count, here and in the report"
             caption = f"asked for: {experiment.num_replicates} of each; {count_all}"

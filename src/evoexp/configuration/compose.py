@@ -251,7 +251,7 @@ def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Buil
 def _is_changed(
     compose: Composer, overrides: Choice, only: Sequence[str], built: Mapping[str, Built]
 ) -> bool:
-    """Whether the conditions differ from those that the experiment has by itself."""
+    """Whether the conditions differ from the experiment's own."""
     plain = {key: each for key, each in overrides.items() if key in NOT_IDENTITY}
     if compose.file is None or (len(plain) == len(overrides) and not only):
         return compose.file is None

@@ -90,7 +90,7 @@ def trail_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
         *arm_keys(arms, name),
         style.key("first posture", color=grey, linewidth=1.4, linestyle=DASHES),
         style.key("last posture", color=grey, linewidth=WIDE, marker="o", mfc="white", ms=4),
-        style.key("way of the tip", color=grey, **WAY),
+        style.key("path of the tip", color=grey, **WAY),
     ]
 
 

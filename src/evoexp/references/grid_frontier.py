@@ -63,7 +63,7 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
     """Return the permitted moves by their ends; see `best_walk`."""
     order = np.argsort(network.heads, kind="stable")
     heads, count = network.heads[order], len(network.unsafeness)
-    # place of each move among those that end at the same node
+    # place of each move among the moves that end at the same node
     rank = np.arange(len(heads)) - np.searchsorted(heads, heads)
     moves = int(rank.max()) + 1
     tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)
@@ -305,7 +305,7 @@ def best_walk(
         if count % BLOCK and bounds[count] < least:
             costs[count] = costs_at(count, count)[count]
             least = min(least, costs[count])
-    must = "as many as a path from start to goal has"
+    must = "at least the number of nodes from start to goal"
     demand(np.isfinite(costs.min()), "reference.max_nodes", must, max_nodes)
     best = int(costs.argmin())
     _, walk = best_walks(arrivals, lam / best * arrivals.unsafeness, best)

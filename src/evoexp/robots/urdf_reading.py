@@ -201,7 +201,7 @@ def _joint(joint: Any, field: str) -> UrdfJoint:
     axis, limit, rule = (joint.find(part) for part in ("axis", "limit", "mimic"))
     direction = _numbers(axis, "xyz", "1 0 0")
     if kind != "floating" and not sum(map(abs, direction)) > SHORTEST:
-        must = "a URDF whose axes point somewhere"
+        must = "a URDF whose axes are not zero"
         raise SettingError(field, must, f"joint '{name}': {axis.get('xyz')}")
     texts = [None if limit is None else limit.get(side) for side in ("lower", "upper")]
     low, high = (None if text is None else float(text) for text in texts)
@@ -254,10 +254,10 @@ def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
         passed = [joint.name]
         while joint.mimic is not None:
             if joint.mimic.source not in joints:
-                must = "a URDF whose joints follow joints that are there"
+                must = "a URDF whose joints follow joints that exist"
                 raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
             joint = joints[joint.mimic.source]
-            must = "a URDF whose joints do not follow themselves"
+            must = "a URDF whose joints follow other joints"
             demand(joint.name not in passed, field, must, " → ".join([*passed, joint.name]))
             passed.append(joint.name)
 

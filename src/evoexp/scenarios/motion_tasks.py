@@ -288,8 +288,8 @@ class PostureTask(SceneTask):
     # how deep pairs that may touch may overlap; None where no phase has such pairs [length
     # unit]
     allowed_penetration: Positive | None = None
-    # whether all obstacles are taken away but those that a goal or a grasp names: the control
-    # by which obstacles are judged
+    # whether all obstacles are taken away, except the ones that a goal or a grasp names: the
+    # control by which obstacles are judged
     empty_scene: bool = False
 
     def _check(self) -> None:
@@ -327,7 +327,7 @@ class PostureTask(SceneTask):
 
     @property
     def all_names(self) -> tuple[str, ...]:
-        """Names of the obstacles, those that an empty scene takes away included."""
+        """Names of all obstacles, even if an empty scene takes them away."""
         return tuple(one.name or f"obstacle_{k + 1}" for k, one in enumerate(self.obstacles))
 
     @property

@@ -42,7 +42,7 @@ class OnePoint(Crossover):
 
 
 class GeneCrossover(Crossover, is_base=True):
-    """A crossover that makes every gene of two children of that gene of two parents."""
+    """A crossover that makes each gene of two children from the same gene of two parents."""
 
     def num_uniforms(self, genome: Genome, count: int) -> int:
         """Return one for every pair, its decision, and two for each of its genes."""

@@ -12,7 +12,7 @@ from evoexp.validation import NonNegativeCount, Positive
 
 
 class GeneMutation(Mutation, is_base=True):
-    """A mutation of every gene with its rate, or of one gene of an individual."""
+    """Mutates every gene with the rate, or one gene of an individual."""
 
     # whether an individual is mutated with the rate, in one gene; else every gene is
     one_gene: bool = False
@@ -44,7 +44,7 @@ def draw_amounts(num_genes: int, count: int, context: Context) -> FloatArray:
 
 
 class NonUniformMutation(GeneMutation):
-    """Moves a gene towards one of its limits, less and less far (Michalewicz 1992).
+    """Moves a gene towards one of its limits, by ever smaller steps (Michalewicz 1992).
 
     With l and h the limits, x becomes x + (h − x) r s or x − (x − l) r s, each with probability
     1/2; r is uniform in [0, 1) and s = (1 − t/T)^b.

@@ -20,7 +20,7 @@ from evoexp.validation import Component, Count, NonNegativeCount, Rate
 
 
 class Genome(NamedTuple):
-    """The genes of a problem, as far as operators need to know them."""
+    """The limits and the layout of a problem's genes."""
 
     limits: FloatArray  # (genes, 2) least and greatest value of each gene
     arms: IntArray  # (arms, 2) first joint of each arm, and the one behind its last
@@ -28,7 +28,7 @@ class Genome(NamedTuple):
 
     @classmethod
     def of(cls, limits: FloatArray) -> "Genome":
-        """Return genes that are no strings of via-points: one arm, one point."""
+        """Return genes that do not form via-points: one arm, one point."""
         return cls(np.ascontiguousarray(limits), np.array([[0, len(limits)]]), 1)
 
 
@@ -50,7 +50,7 @@ CONTEXT = numba.typeof(Context(*_NONE, 0.0, 0.0, _NONE[0], Genome.of(_NONE[1])))
 
 
 class Operator(Component, is_base=True):
-    """A component whose numeric fields are what its kernel takes as `settings`, in their order."""
+    """A component whose kernel takes its numeric fields as `settings`, in their order."""
 
     kernel_name: ClassVar[str]  # of the static method that is the kernel
     signature: ClassVar[Any]  # of every kernel of the kind
@@ -91,7 +91,7 @@ class Selection(Operator, is_base=True):
 
 
 class Crossover(Operator, is_base=True):
-    """Makes offspring of parents; parents 2k and 2k + 1 form a pair, an odd last one stays alone.
+    """Makes offspring from parents; parents 2k and 2k + 1 form a pair, an odd last one stays alone.
 
     Its kernel is the static method `cross(genomes, parents, context, out)`:
 
@@ -141,7 +141,7 @@ def _by_name(value: Any) -> Any:
 
 
 Named = Annotated[Kind, BeforeValidator(_by_name)]
-"""A field of operators: a component, or the name of one whose settings all have usual values."""
+"""A field of operators: a component, or the name of one whose settings all have defaults."""
 
 
 class PopulationSettings(Component, is_base=True):

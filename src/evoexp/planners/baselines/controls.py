@@ -165,11 +165,11 @@ def transposed_root(matrix: FloatArray) -> FloatArray:
 class CmaEs(RealVectorControl):
     """Adapts mean and covariance of a normal distribution of individuals to what costs least.
 
-    It begins with those of individuals drawn as the planner draws its own first ones. With
+    It begins with individuals drawn as the planner draws its own first ones. With
     `improves` each individual goes through one pass of the planner's local operator before it is
     judged; what is told to CMA-ES is the vector before it. Where all steps have become too small to
-    matter, or numbers leave those that can be judged, it starts anew. Linear algebra makes the last
-    bits those of an environment.
+    matter, or numbers become too large to be judged, it starts anew. Linear algebra makes the last
+    bits depend on the environment.
     """
 
     reproducibility: ClassVar[Reproducibility] = "environment"

@@ -83,7 +83,7 @@ def length_notes(
         notes += [
             f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "
             f"(printed: {PRINTED_STEPS[0]:g} and {PRINTED_STEPS[1]:g})",
-            f"robot {r + 1}: Eq. 3 asks for L = {asked} here ({turn:g} deg), for L = {worst} over "
+            f"robot {r + 1}: Eq. 3 requires L = {asked} here ({turn:g} deg), L = {worst} over "
             f"{HALF_TURN_DEG:g} deg (printed: {PRINTED_LENGTH})",
             f"robot {r + 1}: L = {chromosome_length} (K = {segments - 1}) takes steps of "
             f"{step:.2f} deg at best, which {verdict}",
@@ -119,9 +119,9 @@ class Coevolution(PlannerDefaults, Component):
     ga: CoevolutionSettings  # populations, generations, rates, hall of fame
     objective: MotionCriteria  # weights of C1 … C4
     collision: LinkCrossings  # links as lines, or their envelopes
-    # which teams are an answer: those that the model accepts at the configurations it tests,
-    # or those of them whose motion the exact certifier proves; robots of one that is refuted
-    # count as colliding once more
+    # which teams are an answer: all that the model accepts at the configurations it tests, or
+    # only teams whose motion the exact certifier also proves; robots of a refuted team count
+    # as colliding once more
     acceptance: Acceptance = "model"
 
     def _check(self) -> None:

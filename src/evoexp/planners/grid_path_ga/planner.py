@@ -5,7 +5,7 @@ valid by construction: random walks make permitted moves, and crossover and muta
 cost is the weighted sum of its length and the mean unsafeness of its nodes.
 
 A population is a table of whole numbers, see `paths.grids`; a solution is flat: the
-coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
+coordinates x, y[, z] of all its nodes, one after the other.
 """
 
 import functools
@@ -246,7 +246,7 @@ def _prepared(
     collision: PotentialFields, acceptance: Acceptance, robot: FloorPlatform, scenario: GridMotion
 ) -> Problem:
     """Prepare a problem, kept for planners that differ in weights and rates alone."""
-    must = f"as many as the grid has ({len(scenario.size)})"
+    must = f"the dimensions of the grid ({len(scenario.size)})"
     demand(robot.dimensions == len(scenario.size), "robot.dimensions", must, robot.dimensions)
     fields, margin = collision.bind(scenario.blocked()), scenario.security_margin
     bodies, between = scene(robot.build(), scenario.bodies()), "obstacles"

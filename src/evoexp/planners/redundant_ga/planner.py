@@ -62,15 +62,15 @@ class RedundantGa(PlannerDefaults, Component):
 
     num_attempts: Count  # how often SP1 and SP2 are searched at most
     stop_cost_sp1: Positive  # the search of SP1 ends where the objective is smaller
-    stop_cost_sp2: Positive  # the same of SP2
+    stop_cost_sp2: Positive  # the search of SP2 ends where the objective is smaller
     # A sub-path is successful below its stopping cost (`threshold`), or if its cost is
     # `finite`
     success: Literal["threshold", "finite"]
     ga: sub_path.SelectiveSettings  # population, generations, operators
     objective: Reaching  # weights of Eq. 4
     collision: LinkEllipses  # positions and chords that are tested
-    # which ends of sub-paths may be the best one: those that the model accepts, or those of
-    # them whose sub-path the exact certifier proves; one that is refuted costs inf
+    # which ends of sub-paths may be the best one: all that the model accepts, or only ends
+    # whose sub-path the exact certifier also proves; a refuted end costs inf
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:

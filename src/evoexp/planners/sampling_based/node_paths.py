@@ -38,7 +38,7 @@ class TreePaths(PlannerDefaults):
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
         """Refuse: trees are grown, paths are not drawn one by one."""
-        raise SettingError("planner", "one that draws paths one by one", self.component)
+        raise SettingError("planner", "a planner that draws paths one by one", self.component)
 
     def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
         """Return one path of a population (nq, nodes, individuals) as a flat solution."""

@@ -49,14 +49,14 @@ class TwoStage(PlannerDefaults, Component):
 
     placement: PlacementGa  # the planner of the first stage
     path: GridPathGa  # the planner of the second one
-    # which missions are an answer: those that both stages accept (`model`), or those of them
-    # whose whole motion, driving and docking, the exact certifier proves (`certified`,
-    # `margin`). Moves over the grid that it refutes are forbidden then
+    # which missions are an answer: all that both stages accept (`model`), or only missions
+    # whose whole motion, driving and docking, the exact certifier also proves (`certified`,
+    # `margin`). Refuted moves over the grid are then forbidden
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
         """Prepare both stages."""
-        must = "of a floor, two numbers"
+        must = "two numbers, the size of a floor"
         demand(len(scenario.grid.size) == 2, "scenario.grid.size", must, list(scenario.grid.size))
         placement = self.placement.prepare(robot.arm(), scenario.docking)
         path = self._driving.prepare(robot.platform(), scenario.grid)

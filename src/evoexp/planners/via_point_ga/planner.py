@@ -60,10 +60,10 @@ class ViaPointGa(ArmDefaults, Component):
     # site in every arm's path; `segment` exchanges what lies between the two sites of the
     # whole string: the end of the first path and the beginning of the second
     crossover_reading: Literal["tails", "segment"] = "tails"
-    # which motions are an answer: those that the collision model accepts at the instants it
-    # tests (`model`), those of them that the exact certifier proves free of contact between
-    # all instants (`certified`), or also free by the task's margins (`margin`). A string that
-    # is refuted counts as colliding at one instant more
+    # which motions are an answer: all that the collision model accepts at the instants it tests
+    # (`model`), or only motions that the exact certifier also proves free of contact between
+    # all instants (`certified`), or free by the task's margins (`margin`). A refuted string
+    # counts as colliding at one instant more
     acceptance: Acceptance = "model"
 
     def _check(self) -> None:

@@ -81,7 +81,7 @@ def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
     goal = style.key("goal", color="none", marker="*", mec=style.NEUTRAL, mfc="white", ms=9)
-    tool = style.key("way of the tool", color=style.arm_colour(1), linewidth=1.0)
+    tool = style.key("path of the tool", color=style.arm_colour(1), linewidth=1.0)
     style.keys_below(figure, [*trails.trail_keys([])[:-1], tool, goal])
     return figure
 
@@ -189,7 +189,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
         colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
         look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
         right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **look)
-    right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="way of the tool")
+    right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="path of the tool")
     _draw_ends(right, tool)
     style.operational_axes(right, table["length_unit"].iloc[0])
     right.set(title="b  the tool, one step from the start", **EQUAL)

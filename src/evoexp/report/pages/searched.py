@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from evoexp.report.figures import records
+from evoexp.report.figures import Rows, records, table_of
 from evoexp.report.results.run_measures import solved
 from evoexp.report.results.stored_results import ConditionResults, Results
 
@@ -43,7 +43,8 @@ def _proven(condition: ConditionResults) -> np.ndarray:
     return solved(condition) & (certified | np.isnan(condition.column("clearance")))
 
 
-def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.DataFrame:
+@table_of("trial problem score proven runs queries")
+def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> Rows:
     """Return the score of every trial on every problem.
 
     A run that is proven counts its cost, divided by the mean cost of the proven runs of trial 0 on
@@ -57,7 +58,7 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.
     Returns:
         Columns trial, problem, score, proven (runs), runs (planned), queries (mean per run).
     """
-    rows, references = [], dict[str, float]()
+    references = dict[str, float]()
     for trial in searched.trials:
         for problem, key in zip(searched.problems, trial.ids, strict=True):
             first = np.asarray(runs[key].summaries.index < searched.num_replicates)
@@ -74,9 +75,7 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> pd.
             score = (ratios.sum() + searched.unsolved * missing) / searched.num_replicates
             queries = runs[key].column("collision_queries")[first].mean() if first.any() else 0.0
             numbers = float(score), len(costs), searched.num_replicates, float(queries)
-            rows.append((trial.number, problem, *numbers))
-    names = ["trial", "problem", "score", "proven", "runs", "queries"]
-    return pd.DataFrame(rows, columns=names)
+            yield trial.number, problem, *numbers
 
 
 def words_of(trial: Trial) -> str:

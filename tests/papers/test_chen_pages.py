@@ -69,7 +69,7 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
 
 @pytest.fixture(scope="module")
 def cases(outputs: Path) -> list[Case]:
-    return docking_postures.cases(smoke_results(outputs, "chen_placement"), PRINTED)
+    return list(docking_postures.cases(smoke_results(outputs, "chen_placement"), PRINTED))
 
 
 def test_conditions_are_told_apart(cases: list[Case]) -> None:

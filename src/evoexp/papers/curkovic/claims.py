@@ -161,7 +161,7 @@ class Share(NamedTuple):
         return f"{100 * self.value:.0f} %" + within * bool(np.isfinite(self.interval).any())
 
 
-def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
+def corners(conditions: Sequence[ConditionResults]) -> Iterator[Corner]:
     """Group conditions that differ in hall and elites only; groups that lack one are left out."""
 
     def key(condition: ConditionResults) -> tuple[object, ...]:
@@ -174,7 +174,6 @@ def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
             return "elites" if ga.num_elites else "nothing"
         return "other" if ga.hall_frozen or ga.hall_memory is not None else str(ga.hall_distinct)
 
-    found = []
     for own in run_measures.grouped(conditions, key):
         by: dict[str, list[ConditionResults]] = {}
         for c in own:
@@ -183,8 +182,7 @@ def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
             elites = tuple(sorted(by["elites"], key=lambda c: int(c.planner.ga.num_elites)))
             halls = (*by["genome"][:1], *by.get("index", ())[:1])
             name, others = halls[0].label.rpartition(", ")[0], tuple(by.get("other", ()))
-            found.append(Corner(name, by["nothing"][0], elites, halls, others))
-    return tuple(found)
+            yield Corner(name, by["nothing"][0], elites, halls, others)
 
 
 def share(gain: Gain, compared: Sequence[ConditionResults], settings: ReportSettings) -> Share:

@@ -104,7 +104,10 @@ def _watcher(folder: Path, deeds: list[str]) -> Callable[[str, tuple[Any, ...]],
     allowed = (str(folder.resolve()), str(cache_root().resolve()), temporary, "/dev/null")
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
-        is_change = event in _CHANGES or (event == "open" and _writes(*arguments[1:]))
+        is_change = event in _CHANGES
+        if event == "open":
+            _, mode, flags = arguments
+            is_change = bool(flags & _WRITES) if mode is None else not {*"wax+"}.isdisjoint(mode)
         place = "/dev/null"
         if is_change and not isinstance(arguments[0], int):
             place = os.path.abspath(os.fsdecode(arguments[0]))
@@ -112,7 +115,3 @@ def _watcher(folder: Path, deeds: list[str]) -> Callable[[str, tuple[Any, ...]],
             deeds.append(f"{event}{arguments!r:.200}")
 
     return watch
-
-
-def _writes(mode: str | None, flags: int) -> bool:
-    return bool(flags & _WRITES) if mode is None else any(letter in mode for letter in "wax+")

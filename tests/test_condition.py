@@ -1,6 +1,5 @@
 """A condition: canonical form, hash, what it refuses, and the names it may use."""
 
-import ast
 import copy
 import importlib.metadata
 import json
@@ -14,6 +13,7 @@ from evoexp import errors, registry
 from evoexp.condition import Condition, revisions
 from evoexp.errors import EvoexpError, RegistrationError, RevisionMismatch, UnknownSetting
 from evoexp.registry import component_class
+from evoexp.validation import Component
 from evoexp.version import __version__
 from guests import on_path, write_distribution
 from shipped_conditions import (
@@ -256,15 +256,16 @@ def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
 
 
 def test_every_component_is_registered_and_nothing_else() -> None:
-    named = {}  # component → `module:class` of every class that names itself one
-    for path in SOURCE.rglob("*.py"):
-        module = ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts)
-        templates = "assets" in path.parts  # of guests
-        for kind in ast.walk(ast.parse("" if templates else path.read_text())):
-            for line in kind.body if isinstance(kind, ast.ClassDef) else ():
-                text = ast.unparse(line)
-                if text.startswith("component: ") and isinstance(line.value, ast.Constant):
-                    named[line.value.value] = f"{module}:{kind.name}"
+    for path in (path for path in SOURCE.rglob("*/*.py") if "assets" not in path.parts):
+        importlib.import_module(".".join(path.relative_to(SOURCE.parent).with_suffix("").parts))
+    kinds: list[type] = [Component]
+    for kind in kinds:
+        kinds += kind.__subclasses__()
+    named = {
+        kind.component: f"{kind.__module__}:{kind.__name__}"
+        for kind in kinds
+        if "component" in vars(kind) and kind.__module__.startswith("evoexp.")
+    }
     registered = {
         each.name: each.target
         for each in registry.registrations(registry.COMPONENTS)

@@ -146,7 +146,7 @@ def test_it_runs_from_a_wheel_and_is_missed_when_it_is_gone(
     execute("pip", "install", "--quiet", *OFFLINE, "--force-reinstall", str(wheel))
     (work / NAME).rename(work / "gone")
     printed = execute("evoexp", "run", f"experiment={NAME}", "budget=smoke", "--no-report")
-    assert printed.startswith("nothing to run: every replicate is there")
+    assert printed.startswith("nothing to run: every replicate is stored")
     execute("pip", "uninstall", "--quiet", "--disable-pip-version-check", "-y", NAME)
     with pytest.raises(AssertionError, match=f"needs {NAME} 0.1.0, which is not installed"):
         execute("evoexp", "reproduce", run[0])

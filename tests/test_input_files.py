@@ -47,19 +47,19 @@ OTHERS = {
     "no items along an endless axis": (npy("(0, 9223372036854775807)", size=0), "."),
     "too few items": (npy("(2, 3)", size=32), "2 × 3 numbers of 8 bytes, 32 bytes follow"),
     "too many items": (npy("(2, 3)"), "2 × 3 numbers of 8 bytes, 64 bytes follow"),
-    **{shape: (npy(shape), "tells no shape|header is damaged") for shape in (
+    **{shape: (npy(shape), "has no shape|header is damaged") for shape in (
         "(-2, -4)", "(8, -1)", "(8, 1.0)", "(8, True)", "8", "(8, 'a')", "(" * 5000 + ")" * 5000
     )},
-    "objects": (npy("(8,)", "|O"), "no numbers"),
-    "texts": (saved(np.array(["a"])), "no numbers"),
+    "objects": (npy("(8,)", "|O"), "not numbers"),
+    "texts": (saved(np.array(["a"])), "not numbers"),
     "items of no kind": (npy("(8,)", "<f3"), "header is damaged"),
     "fields": (npy("(8,)", "<f8', 'x"), "header is damaged"),
     "a header without end": (b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**32 - 1), "."),
     "code": (b"\x93NUMPY\x01\x00\x20\x00" + b"__import__('os').system('touch x')", "damaged"),
     "half a header": (npy("(8,)")[:20], "header is damaged"),
     "another version": (b"\x93NUMPY\x09\x00" + npy("(8,)")[8:], "."),
-    "another file": (b"PK", "does not begin as one"),
-    "nothing": (b"", "does not begin as one"),
+    "another file": (b"PK", "first bytes are not those"),
+    "nothing": (b"", "first bytes are not those"),
 }  # fmt: skip
 
 

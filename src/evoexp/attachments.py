@@ -141,7 +141,7 @@ def mesh_content(name: str, file: Path, packages: Mapping[str, Path], field: str
         if name.startswith(PACKAGE):
             setting = f"{field.rpartition('.')[0]}.packages"
             places += f"; {setting}={{NAME: FOLDER}} and {PACKAGE_PATHS} tell where packages lie"
-        must = "a file whose meshes are there"
+        must = "a file whose meshes exist"
         raise SettingError(field, must, f"a missing mesh '{name}'", brief(places, MOST_PLACES))
     if place.resolve().suffix.lower() not in MESHES:
         must = f"a file whose meshes are files that end in {', '.join(MESHES)}"

@@ -64,7 +64,7 @@ def _run(words: Sequence[str], is_process: bool) -> int:
             from evoexp.configuration.search_path import searched_first
 
             stack.enter_context(searched_first(folders))
-        stack.enter_context(command_process.damage_in_lines())
+        stack.enter_context(command_process.notices_in_lines())
         return int(command_function(chosen)(given))
 
 

@@ -140,11 +140,12 @@ class StoreError(EvoexpError):
     """A run directory that is damaged, or that belongs to another condition."""
 
 
-class DamagedStore(UserWarning):
-    """A stored file is damaged: it is left out, taken from elsewhere, or set aside.
+class Notice(UserWarning):
+    """One line for the user of a command, which goes on; it is printed on stderr as it is."""
 
-    The text is one line. The command line prints it on stderr as it is.
-    """
+
+class DamagedStore(Notice):
+    """A stored file is damaged: it is left out, taken from elsewhere, or set aside."""
 
 
 class Busy(EvoexpError):
@@ -160,4 +161,4 @@ class MotionFileError(EvoexpError):
 
 
 class NothingStored(EvoexpError):
-    """The outputs hold no finished replicate of what was asked for."""
+    """The outputs hold no finished replicate of the requested runs."""

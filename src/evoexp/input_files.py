@@ -38,12 +38,12 @@ def read_bounded(path: str | Path, limit: int = MAX_INPUT) -> bytes:
     """
     name = str(path)
     if "\0" in name:
-        raise OSError(errno.EINVAL, "no name of a file", name)
+        raise OSError(errno.EINVAL, "not a file name", name)
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
         if stat.S_ISDIR(status.st_mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
-        raise OSError(errno.EINVAL, "no regular file", name)
+        raise OSError(errno.EINVAL, "not a regular file", name)
     if status.st_size > limit:
         reason = f"larger than {limit / MEGABYTE:g} MB: {status.st_size / MEGABYTE:.0f} MB"
         raise OSError(errno.EFBIG, reason, name)
@@ -112,7 +112,7 @@ def read_npy(content: bytes) -> NDArray[Any]:
     Nothing is allocated before the header's shape is found to be that of the bytes behind it.
     """
     if not content.startswith(npy_format.MAGIC_PREFIX):
-        raise ValueError("it does not begin as one")
+        raise ValueError("its first bytes are not those of a .npy file")
     file = io.BytesIO(content)
     try:
         is_first = npy_format.read_magic(file) == (1, 0)
@@ -122,13 +122,13 @@ def read_npy(content: bytes) -> NDArray[Any]:
     except (*_UNREADABLE, RecursionError, MemoryError):
         raise ValueError("its header is damaged") from None
     if kind.kind not in "biuf":
-        raise ValueError(f"it holds no numbers but {kind.str!r}")
+        raise ValueError(f"it holds {kind.str!r}, not numbers")
     if not all(type(n) is int and 0 <= n < 2**63 for n in shape):
-        raise ValueError("its header tells no shape")
+        raise ValueError("its header has no shape")
     data = file.read()
     if math.prod(shape) * kind.itemsize != len(data):
         numbers = f"{' × '.join(map(str, shape))[:60]} numbers of {kind.itemsize} bytes"
         told = numbers if shape else "one number"
-        raise ValueError(f"its header tells {told}, {len(data)} bytes follow")
+        raise ValueError(f"its header promises {told}, {len(data)} bytes follow")
     order: Any = "F" if columns_first else "C"
     return np.frombuffer(data, kind).reshape(shape, order=order).copy()

@@ -1,4 +1,4 @@
-"""The Python door: stored results as pandas frames."""
+"""Stored results as pandas frames, for use in Python."""
 
 import re
 from collections.abc import Sequence
@@ -77,10 +77,10 @@ def load(
         Frames whose column `label` names the condition as the figures do, `condition` by its hash.
 
     Raises:
-        UnknownOption: If `what` is neither.
+        UnknownOption: If `what` is neither an experiment nor a hash.
         UnknownHash: If no stored run has this hash.
         AmbiguousHash: If several runs begin with it.
-        NothingStored: If nothing of it has been run.
+        NothingStored: If no run of it is stored.
 
     Warns:
         DamagedStore: If a log is damaged; it is left out.

@@ -28,9 +28,9 @@ TIMES = ("certificate_s", "cpu_s", "wall_s")
 class Generation(NamedTuple):
     """One generation of one replicate: a row of a `Block`, as tests and guests see it.
 
-    `costs` and `population` are views into the planner's memory: valid until the next generation is
-    asked for, hashed into the digest and not recorded. `best` is never changed: a better one is
-    another array.
+    `costs` and `population` are views into the planner's memory, valid until the next generation is
+    requested. They are hashed into the digest and not recorded. `best` is never changed: a better
+    solution is another array.
     """
 
     index: int  # type: ignore[assignment]  # 0 is the initial population
@@ -56,7 +56,7 @@ class Generation(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The best solution from a generation of a block on, up to the next one of the block."""
+    """The best solution so far, from a generation of a block until the block's next best."""
 
     place: int  # of this generation in its block
     solution: FloatArray  # flat, never changed
@@ -106,25 +106,25 @@ class Block(NamedTuple):
 
     @property
     def num_generations(self) -> int:
-        """How many generations there are."""
+        """Number of generations."""
         return len(self.lowest)
 
     @property
     def best(self) -> FloatArray:
-        """The best solution so far behind the last generation."""
+        """The best solution so far, after the last generation."""
         return self.bests[-1].solution
 
     @property
     def best_of_each(self) -> list[Best]:
-        """The best so far behind each generation."""
+        """The best so far after each generation."""
         places = [best.place for best in self.bests[1:]]
         repeats = map(sub, [*places, self.num_generations], [0, *places])
         return [*chain.from_iterable(map(repeat, self.bests, repeats))]
 
     def head(self, count: int) -> "Block":
-        """Return the first generations, behind which the next one was asked for already.
+        """Return the first `count` generations, after the next one was requested.
 
-        Where all populations are shown in one array, it holds the next one's then.
+        If all populations share one array, it then holds the next one.
         """
         population = self.population(count - 1) if count else np.empty(0)
         self.population(count)
@@ -139,7 +139,7 @@ class Block(NamedTuple):
         )
 
     def generations(self) -> Iterator[Generation]:
-        """Yield the generations one by one, each valid until the next one is asked for."""
+        """Yield the generations one by one, each valid until the next one is requested."""
         last = self.num_generations - 1
         for k, best in enumerate(self.best_of_each):
             yield Generation(
@@ -195,7 +195,7 @@ class SolutionRow(NamedTuple):
 
 
 class FrontRow(NamedTuple):
-    """Criteria of one population in one generation; a front holds those that no other dominates."""
+    """Criteria of one population in one generation, from which its front follows."""
 
     generation: int  # its index
     population: int  # its index among co-evolving populations
@@ -217,7 +217,7 @@ class ReplicateSummary(NamedTuple):
     solved: bool  # by the paper's own collision model
     # by the exact certifier, over the whole motion; None: undecided, or there is no motion
     certified: bool | None
-    certified_margin: bool | None  # the same of the clearance that the scenario requires
+    certified_margin: bool | None  # the same for the clearance that the scenario requires
     # [length_unit] least distance of the bodies over the motion; 0 in contact, NaN without motion
     clearance: float
     clearance_at: float | None  # [instant] where the bodies are that close

@@ -1,4 +1,4 @@
-"""The registry: the names that installed packages, evoexp among them, give to what they bring.
+"""The registry: names of the components, pages and claims that installed packages bring.
 
 A package declares entry points in its metadata. Four groups are read:
 
@@ -8,9 +8,9 @@ A package declares entry points in its metadata. Four groups are read:
 - `evoexp.claims`: paper → `package:claims.yaml`, its claims with their rules;
 - `evoexp.conf`: any name → `package:folder`, a folder of options (see `configuration.search_path`).
 
-A configuration is data; it can name registered components only, also when it comes out of somebody
-else's log. A component or page of another package than evoexp has a name that begins with the
-package's: the distribution `my-planner` may register `my_planner` and `my_planner_…`.
+A configuration is data: it can name registered components only, even if it comes from somebody
+else's log. The components and pages of a guest package have names that begin with the package's
+name: the distribution `my-planner` may register `my_planner` and `my_planner_…`.
 """
 
 import functools
@@ -101,7 +101,7 @@ def _registrations() -> dict[str, tuple[Registration, ...]]:
 
 
 def clear() -> None:
-    """Forget the metadata that were read, so that they are read again."""
+    """Forget the metadata, so that they are read again."""
     _registrations.cache_clear()
     guests.cache_clear()
 
@@ -155,7 +155,7 @@ def components_in(config: Any, field: str = "") -> Iterator[tuple[str, dict[str,
 
 @functools.lru_cache(maxsize=64)
 def guests(config_json: bytes) -> dict[str, str]:
-    """Return component → `distribution version` of a condition's components of guests."""
+    """Return the guest components of a condition → their `distribution version`."""
     named = (str(settings[TARGET]) for _, settings in components_in(json.loads(config_json)))
     found = (registered(COMPONENTS, name) for name in named)
     return {each.name: each.package for each in found if each is not None and not each.is_own}
@@ -168,7 +168,7 @@ def missing(components: Mapping[str, str]) -> list[str]:
 
 
 def lacking(config_json: bytes) -> str:
-    """Return how to install what a condition (canonical form) needs; nothing if all is there."""
+    """Return how to install what a condition (canonical form) lacks; empty if it lacks nothing."""
     for component, (package, extra) in EXTRAS.items():
         is_used = f'"_target_":"{component}"'.encode() in config_json
         if is_used and importlib.util.find_spec(package) is None:

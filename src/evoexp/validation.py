@@ -6,6 +6,7 @@ by its path; nothing is coerced but whole numbers into float fields and lists in
 """
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
@@ -48,8 +49,15 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
+    def model_post_init(self, context: Any) -> None:
+        """Check the fields together, once each of them is valid."""
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse fields that contradict each other by a SettingError."""
+
     def demand(self, field: str, holds: bool, must: str) -> None:
-        """Refuse these settings by a field of which something does not hold.
+        """Refuse these settings unless a condition on a field holds.
 
         Raises:
             SettingError: If it does not.
@@ -76,11 +84,21 @@ AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
 class Component(Settings):
-    """Settings with a registered name, which `_target_` in a YAML option refers to."""
+    """Settings with a registered name, which `_target_` in a YAML option refers to.
+
+    A class of evoexp that gives itself no name has its class's: `OnePoint` is `one_point`. Bases of
+    several components have none, and say so: `class Crossover(Operator, is_base=True)`.
+    """
 
     component: ClassVar[str]  # the registered name
     # raised whenever the same settings give other results than before; part of every identity
     revision: ClassVar[int] = 1
+
+    def __init_subclass__(cls, is_base: bool = False, **options: Any) -> None:
+        """Name a component of evoexp; a guest's name begins with that of its distribution."""
+        super().__init_subclass__(**options)
+        if cls.__module__.startswith("evoexp.") and not is_base and "component" not in vars(cls):
+            cls.component = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     @model_validator(mode="before")
     @classmethod
@@ -107,9 +125,9 @@ def build(
     Args:
         data: A mapping with `_target_`, or any nesting of mappings, lists and scalars around such
             mappings.
-        lookup: Gives the class of a registered name, whose field its error names.
+        lookup: Returns the class of a registered name; its error names the field.
         field: Dotted path of `data`, for errors.
-        largest: No number may be larger than that, of either sign.
+        largest: Largest absolute value of a number.
     """
     if isinstance(data, Mapping):
         children = {

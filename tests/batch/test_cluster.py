@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,8 +14,9 @@ from batch_samples import around_plug_in, digests, failures, new_batch, run
 from process_table import eventually
 
 from evoexp import shipped
-from evoexp.batch import jobs
+from evoexp.batch import cluster
 from evoexp.condition import Condition
+from evoexp.errors import Notice
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 from store_lookup import find_runs
@@ -67,7 +69,7 @@ def test_a_killed_worker_loses_nothing_but_its_own_replicate(
 ) -> None:
     fail("kill_once:3;kill:7;raise:9;slow:5")
     reasons = failures(run(tmp_path / "outputs", (faulty, 12), **DASK, timeout_s=5.0))
-    died = "worker process died twice"  # of 5 by its own time limit, which a thread cannot tell
+    died = "worker process died twice"  # of 5 by its time limit: sleep hears no exception
     assert reasons.pop(9).startswith("ArithmeticError: ")
     assert reasons == {5: died, 7: died}
     expected = {k: digest for k, digest in undisturbed.items() if k not in (5, 7, 9)}
@@ -88,7 +90,7 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(
         next(outcomes)
         local.sync(local.scheduler.close)
         must = r"^runner\.address: the scheduler at tcp://.* went away; finished replicates"
-        with pytest.raises(jobs.ClusterError, match=must):
+        with pytest.raises(cluster.ClusterError, match=must):
             list(outcomes)
     assert RunDirectory(tmp_path / "outputs", faulty.id).completed()
 
@@ -97,10 +99,24 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_finished_stays(
 def test_a_worker_with_other_code_is_refused(
     faulty: Condition, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(jobs, "code_identity", lambda: "0.0.1 (abc)")
+    monkeypatch.setattr(cluster, "code_identity", lambda: "0.0.1 (abc)")
     must = r"^runner\.address: the worker on .* must have evoexp 0\.0\.1 \(abc\), has "
-    with pytest.raises(jobs.ClusterError, match=must):
+    with pytest.raises(cluster.ClusterError, match=must):
         run(tmp_path / "outputs", (faulty, 3), backend="dask", address=scheduler)
+
+
+@pytest.mark.matrix
+def test_a_cluster_without_workers_waits_and_says_so(
+    faulty: Condition, undisturbed: dict[int, str], tmp_path: Path
+) -> None:
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None) as local:
+        settings = {"backend": "dask", "address": local.scheduler_address}
+        threading.Timer(2.0, local.scale, (2,)).start()
+        with pytest.warns(Notice, match=r"^cluster at tcp://.*: no workers at .*, waiting for"):
+            assert failures(run(tmp_path / "outputs", (faulty, 12), **settings)) == {}
+    assert digests(tmp_path / "outputs", faulty) == undisturbed
 
 
 def test_an_address_that_nobody_answers_is_refused(faulty: Condition, tmp_path: Path) -> None:
@@ -108,7 +124,7 @@ def test_an_address_that_nobody_answers_is_refused(faulty: Condition, tmp_path: 
 
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
-        pytest.raises(jobs.ClusterError, match="must be the address of a scheduler that answ"),
+        pytest.raises(cluster.ClusterError, match="must be the address of a scheduler that answ"),
     ):
         run(tmp_path / "outputs", (faulty, 3), backend="dask", address="tcp://127.0.0.1:1")
 

@@ -7,7 +7,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +39,13 @@ def test_time_is_limited_and_nothing_rings_afterwards() -> None:
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
     with pytest.raises(TookTooLong), limited(ReplicateLimits(0.2), in_worker=False):
         signal.pause()
+
+    def in_thread() -> None:  # of a cluster's worker, which no signal reaches
+        with pytest.raises(TookTooLong), limited(ReplicateLimits(0.2), in_worker=True):
+            any(threading.Event().wait(0.01) for _ in range(500))
+
+    with ThreadPoolExecutor(1) as threads:
+        threads.submit(in_thread).result()
 
 
 def changed(name: str, value: Any) -> Condition:

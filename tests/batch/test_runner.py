@@ -3,7 +3,7 @@
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -207,10 +207,6 @@ def test_a_killed_or_slow_worker_costs_its_own_replicate_a_retry(
 # Tasks
 
 
-def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
-    return [Outcome(job.condition_id, job.replicate, "", "", b"", wall_s) for job in jobs]
-
-
 @given(
     st.integers(0, 300),
     st.integers(2, 8),
@@ -226,8 +222,10 @@ def test_every_job_is_run_once_and_in_order(
         share = -(-(num_jobs - len(seen)) // (2 * num_workers))  # nobody waits for one worker
         assert 1 <= len(bundle) <= min(MAX_BUNDLE, max(1, share))
         wall, done = tasks[count % len(tasks)]
-        seen += bundle[:done]  # the worker stopped there
-        replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
+        own = bundle[:done]  # the worker stopped there
+        seen += own
+        outcomes = [Outcome(job.condition_id, job.replicate, "", "", b"", wall) for job in own]
+        replicates.end_task((bundle,), outcomes)
     assert seen == waiting
 
 
@@ -296,6 +294,6 @@ def test_a_stored_cap_is_checked(wrong: bytes) -> None:
 
 
 def test_a_cap_below_the_initial_population_is_one_line() -> None:
-    must = r"budget\.collision_queries: must be at least what the initial population asks for"
+    must = r"budget\.collision_queries: must be at least the queries of the initial population"
     with pytest.raises(SettingError, match=must + r" \(1,000\), was 999"):
         run_replicate(condition("budget.collision_queries=999"), 0)

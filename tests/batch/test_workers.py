@@ -91,7 +91,7 @@ def test_workers_that_never_begin_are_not_started_for_ever(monkeypatch: pytest.M
     with pytest.raises(ImportError, match="no_such_module"), Workers(2) as workers:
         list(in_order(workers, abs, [(1,)]))
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(WorkerError, match="die before they have begun"), Workers(2) as workers:
+    with pytest.raises(WorkerError, match="die before they start"), Workers(2) as workers:
         list(in_order(workers, abs, [(1,)]))
 
 

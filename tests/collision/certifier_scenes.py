@@ -25,11 +25,6 @@ def hull(scale: float) -> Any:
     return convex_shape(HULL_CORNERS * scale, HULL_FACES)
 
 
-def open_mesh() -> Any:
-    """A mesh, which is not convex: an open fan of two faces of the hull."""
-    return mesh(HULL_CORNERS[np.array(HULL_FACES[:2])])
-
-
 def random_rotation(rng: np.random.Generator, planar: bool) -> np.ndarray:
     if planar:
         return pin.exp3(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))
@@ -82,7 +77,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
             normal = rng.normal(size=3)
             shape = coal.Halfspace(normal / np.sqrt((normal**2).sum()), -2.5)
         elif rng.random() < 0.1:
-            shape = open_mesh()
+            shape = mesh(HULL_CORNERS[np.array(HULL_FACES[:2])])  # an open fan, not convex
         placement = pin.SE3(random_rotation(rng, planar), place)
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k}", 0, 0, placement, shape))
         owners.append(-1)

@@ -172,7 +172,7 @@ def test_what_the_search_leaves_out_the_certifier_judges() -> None:
     assert {*pairs.unseen, *pairs.overlapping, *tested} <= watched
     assert not watched & {*pairs.always, *pairs.adjacent}
     notes = " | ".join(condition.planner.notes(problem))
-    assert "touch in no posture sampled, judged by the certifier only: " in notes
+    assert "touch in no sampled posture, judged by the certifier only: " in notes
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b'{"neighbours": 3}', b'{"neighbours": [["a"]]}'])

@@ -33,14 +33,6 @@ def judgement(seed: int) -> _Judgement:
     return _Judgement(scene, random_motion(rng, scene.model.nq), 0.0, RESOLUTION)
 
 
-def bounds_of(judged: _Judgement, begin: float, end: float) -> np.ndarray:
-    """Bounds of speed and of acceleration of all pairs, (2, pairs)."""
-    task, bounds = judged.task, np.empty((2, len(judged.scene.pairs)))
-    scratch = np.empty(len(task.chain.parent))
-    approach_bounds(task.chain, task.coefficients[0], begin, end, task.weights, bounds, scratch)
-    return bounds
-
-
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(seed=SEEDS, begin=st.floats(0.0, 0.99), width=st.floats(1e-3, 1.0))
 def test_nothing_moves_faster_or_nearer_than_its_bounds(
@@ -48,7 +40,9 @@ def test_nothing_moves_faster_or_nearer_than_its_bounds(
 ) -> None:
     judged = judgement(seed)
     task, work, end = judged.task, work_space(judged.task), min(begin + width, 1.0)
-    speeds, accelerations = bounds_of(judged, begin, end)
+    bounds, scratch = np.empty((2, len(task.pairs))), np.empty(len(task.chain.parent))
+    approach_bounds(task.chain, task.coefficients[0], begin, end, task.weights, bounds, scratch)
+    speeds, accelerations = bounds
     u, half, t = 0.5 * (begin + end), 0.5 * (end - begin), np.linspace(begin, end, 15)
     move_to(task, work, 0, u)
     assert task.by_one.all()

@@ -127,13 +127,6 @@ def longest_arm(base: Any, points: Any) -> planar_arms.Arm:
     return planar_arms.Arm((float(base[0]), float(base[1])), tuple(lengths))
 
 
-def almost_touching_envelopes(rng: np.random.Generator) -> tuple[Any, Any]:
-    arms = [planar_arms.Arm((x, 0.0), (0.5, 0.5), 0.125, 0.25) for x in (0.0, 0.75)]
-    angles = rng.integers(0, 5, (2, 3, 2, 80)) * (np.pi / 4.0)
-    angles += rng.uniform(-1.0, 1.0, angles.shape) * 10.0 ** rng.uniform(-9.0, -5.0, angles.shape)
-    return arms, [arm.outlines(q) for arm, q in zip(arms, angles, strict=True)]
-
-
 @pytest.mark.examples(3)
 @pytest.mark.parametrize(
     "kind", ["grid", "thirds", "close", "far", "ulps", "tiny", "huge", "envelopes"]
@@ -142,7 +135,11 @@ def test_counts_are_those_of_single_pairs_where_links_touch(kind: str) -> None:
     """Sign products decide nothing that is close."""
     rng = np.random.default_rng(11)
     if kind == "envelopes":
-        arms, points = almost_touching_envelopes(rng)
+        arms = [planar_arms.Arm((x, 0.0), (0.5, 0.5), 0.125, 0.25) for x in (0.0, 0.75)]
+        angles = rng.integers(0, 5, (2, 3, 2, 80)) * (np.pi / 4.0)
+        off = rng.uniform(-1.0, 1.0, angles.shape)
+        angles += off * 10.0 ** rng.uniform(-9.0, -5.0, angles.shape)
+        points = [arm.outlines(q) for arm, q in zip(arms, angles, strict=True)]
     else:
         bases, points = touching_points(kind, rng, 30)
         arms = [longest_arm(*each) for each in zip(bases, points, strict=True)]

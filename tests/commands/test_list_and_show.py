@@ -232,7 +232,7 @@ def test_show_says_what_the_chromosomes_length_violates(evoexp: Evoexp) -> None:
     out = evoexp("show", "experiment=curkovic_methods", "--only", "V").out
     for line in (
         "robot 1: Eq. 2 allows steps of 5.73 and 11.46 deg (printed: 11.5 and 23)",
-        "robot 2: Eq. 3 asks for L = 42 here (120 deg), for L = 64 over 180 deg (printed: 32)",
+        "robot 2: Eq. 3 requires L = 42 here (120 deg), L = 64 over 180 deg (printed: 32)",
         "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.19 times over",
     ):
         assert line in out

@@ -165,7 +165,7 @@ def test_a_paper_runs_is_judged_and_drawn(evoexp: Evoexp, tmp_path: Path) -> Non
 
 
 WORD = "a word of lower-case letters, digits and _ that begins with a letter"
-USED = "a new name: a component or an option has this one"
+USED = "a new name: a component or option has it already"
 NAMES = dict.fromkeys(
     ("My_planner", "4arms", "my-planner", "my__planner", "class", "a/b", ""), WORD
 )

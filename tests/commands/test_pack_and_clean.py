@@ -29,7 +29,7 @@ def test_an_archive_is_reproduced_and_reported_elsewhere(
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "elsewhere"))
     said = evoexp("reproduce", str(packed))
     assert said.code == 0 and "4 of 4 MATCH" in said.out
-    assert "its logs were compared where they are; nothing was taken into" in said.out
+    assert "its logs were compared in place; nothing was added to" in said.out
     assert not (tmp_path / "elsewhere").exists()
     said = evoexp("report", str(packed))
     assert said.code == 0

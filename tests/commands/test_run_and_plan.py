@@ -20,7 +20,7 @@ from rich.console import Console
 import evoexp.batch.jobs as jobs_module
 from evoexp import load
 from evoexp.batch.jobs import NUM_POINTS, CurveFile, Outcome, read_curves
-from evoexp.commands.run import MOST_ROWS, BatchProgress, drawn
+from evoexp.commands.batch_progress import MOST_ROWS, BatchProgress, drawn
 from evoexp.configuration import compose
 from evoexp.records import Block, Generation
 from evoexp.store.run_directory import RunDirectory
@@ -43,7 +43,7 @@ def test_a_run_says_what_is_there_and_runs_nothing_twice(
     assert max(map(len, first.out.splitlines())) <= 80
     again = evoexp("run", *PLANAR, "--no-report")
     assert again.code == 0
-    assert again.out.startswith("nothing to run: every replicate is there\n")
+    assert again.out.startswith("nothing to run: every replicate is stored\n")
     assert again.out.split("\n", 1)[1] == first.out[first.out.index("rana_planar@smoke") :]
     assert not (outputs / "reports").exists()
 
@@ -82,11 +82,11 @@ def test_conditions_that_become_one_are_one_row_everywhere(
 def test_terminal_and_report_have_all_stored_replicates(evoexp: Evoexp, stored: Path) -> None:
     said = evoexp("run", *PLANAR, "num_replicates=1", "report=paper", *DRAFT)
     assert said.out.count("2 of 2") == 3
-    assert "of 1 asked for: all that are stored, here and in the report" in said.out
+    assert "asked for: 1 of each; more are stored, and all count, here" in said.out
     (page,) = (stored / "reports").glob("*/index.md")
     assert "| `num_replicates` | 2 |" in page.read_text()
     said = evoexp("run", *PLANAR, "--no-report")
-    assert "asked for: all" not in said.out
+    assert "asked for: " not in said.out
 
 
 def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -100,10 +100,10 @@ def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture
 
 def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs: Path) -> None:
     words = ("run", *PLANAR, "num_replicates=1", *DRAFT, "--only", "via-point GA")
-    assert "(as it was)" not in evoexp(*words).out
+    assert "(unchanged)" not in evoexp(*words).out
     (page,) = outputs.glob("reports/*/index.md")
     content, drawn = page.read_bytes(), page.stat().st_mtime_ns
-    assert "index.html (as it was)\n" in evoexp(*words).out
+    assert "index.html (unchanged)\n" in evoexp(*words).out
     assert page.stat().st_mtime_ns == drawn
     assert evoexp("report", "--check", *words[1:]).code == 0
     (log,) = outputs.glob("runs/*/replicates/0000.mcap")
@@ -113,10 +113,10 @@ def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs
         lambda: os.utime(log, ns=(1, 1)),
     ):
         change()
-        assert "(as it was)" not in evoexp(*words).out
+        assert "(unchanged)" not in evoexp(*words).out
         assert page.read_bytes() == content
-    assert "(as it was)" in evoexp(*words).out
-    assert "(as it was)" not in evoexp(*words, "report.confidence=0.9").out
+    assert "(unchanged)" in evoexp(*words).out
+    assert "(unchanged)" not in evoexp(*words, "report.confidence=0.9").out
 
 
 def test_several_experiments_share_a_batch_and_a_condition_runs_once(
@@ -133,9 +133,10 @@ def test_several_experiments_share_a_batch_and_a_condition_runs_once(
 def test_the_manifest_holds_a_command_that_runs_it_again(evoexp: Evoexp, outputs: Path) -> None:
     label = "random search · seed=1"
     swept = ("num_replicates=1", "-m", "seed=0,1", "--only", label, "--no-report")
-    assert evoexp("run", *PLANAR, *swept).code == 0
+    assert evoexp("run", *PLANAR, *swept, "runner.address=tcp://host:1").code == 0
     (run,) = find_runs(outputs)
     manifest = run.manifest()
+    assert "host" not in manifest["command"]
     assert (manifest["experiment"], manifest["label"]) == ("rana_planar", label)
     words = shlex.split(manifest["command"])
     assert words[:2] == ["evoexp", "run"]

@@ -35,10 +35,11 @@ def test_a_search_goes_on_as_if_it_had_not_been_interrupted(evoexp: Evoexp, outp
     (folder / "journal.log").unlink()
     whole = evoexp("run", *WORDS, "sweep.num_trials=6")
     found = trials(whole.out)
+    assert whole.code == 0, whole.err
     assert found == trials(half.out) + trials(rest.out) and len(found) == 6
     assert "nothing to run" in whole.out  # its runs are there
-    refused = [line for line in found if "refused: ga.num_elites: must be at most" in line]
-    assert 0 < len(refused) < 6
+    refused = [line for line in found if "refused: planner.num_new_trajectories: must be" in line]
+    assert 0 < len(refused) < 6, found
 
     # the page tells the trials, with the scores of a slow and obvious second opinion
     report = outputs / "reports" / folder.name

@@ -166,7 +166,7 @@ def test_leftovers_are_named_and_no_damage(evoexp: Evoexp, run: RunDirectory) ->
     said = evoexp("verify")
     assert said.code == 0
     assert said.out.splitlines() == [
-        f"no part of run {run.hash12}: notes.txt (unknown), "
+        f"not part of run {run.hash12}: notes.txt (unknown), "
         "replicates/.0001.mcap.77.tmp (temporary), "
         "replicates/0001.mcap.damaged.2 (set aside earlier)",
         "3 runs, 6 logs: all is well",

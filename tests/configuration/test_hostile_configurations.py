@@ -114,9 +114,9 @@ HOSTILE = {
     "nested deeply": ("a: " + "[" * 20_000 + "]" * 20_000, "50 deep"),
     "code": ("x: !!python/object/apply:os.system ['touch harm']\n", "not determine a constructor"),
     "code by name": ("_target_: os.system\ncommand: touch harm\n", "a registered component"),
-    "the environment": (f"{GA}x: ${{oc.env:SECRET}}\n", "no function, as oc.env is"),
-    "the environment in words": (f"{GA}x: a${{oc.env:SECRET}}b\n", "no function"),
-    "a function of it": (f"{GA}x: ${{oc.decode:${{oc.env:SECRET}}}}\n", "no function"),
+    "the environment": (f"{GA}x: ${{oc.env:SECRET}}\n", "functions such as oc.env are not allowed"),
+    "the environment in words": (f"{GA}x: a${{oc.env:SECRET}}b\n", "functions such as oc.env"),
+    "a function of it": (f"{GA}x: ${{oc.decode:${{oc.env:SECRET}}}}\n", "functions such as oc.env"),
     "a device": ("/dev/zero", "no option 'mine'"),
 }
 
@@ -142,6 +142,6 @@ def test_an_option_that_harms_is_refused(
 
 def test_nothing_of_the_environment_enters_by_an_override(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SECRET", "hush")
-    with pytest.raises(EvoexpError, match="no function, as oc.env is") as caught:
+    with pytest.raises(EvoexpError, match="functions such as oc.env are not allowed") as caught:
         compose.expand([BASE, "budget=smoke", "scenario.length_unit=${oc.env:SECRET}"])
     assert "hush" not in str(caught.value)

@@ -5,41 +5,22 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from evoexp.evolution.operators.crossover import (
-    ArithmeticCrossover,
-    BlxAlpha,
-    OnePoint,
-    UniformCrossover,
-)
-from evoexp.evolution.operators.mutation import (
-    AlleleMutation,
-    GaussianMutation,
-    NonUniformMutation,
-    UniformReset,
-)
+from evoexp.evolution.operators import crossover, mutation, selection
 from evoexp.evolution.operators.operator import Context, Crossover, Mutation, Selection
-from evoexp.evolution.operators.selection import (
-    DifferenceRoulette,
-    FitnessRoulette,
-    InverseRoulette,
-    LinearRanking,
-    Tournament,
-)
 from evoexp.planners.via_point_ga.string_operators import StringCrossover
 from evoexp.records import FloatArray, IntArray
 from evoexp.testing import ContractBroken, check_operator
 
 OPERATORS = (
-    *(Tournament(), Tournament(tournament_size=5), InverseRoulette(), DifferenceRoulette()),
-    *(FitnessRoulette(fitness_offset=0.5), LinearRanking()),
-    *(OnePoint(), UniformCrossover(), ArithmeticCrossover(), BlxAlpha(blend_alpha=2.0)),
-    StringCrossover(crossover_distance=3.0),
-    *(
-        kind(one_gene=own)
-        for kind in (NonUniformMutation, GaussianMutation)
-        for own in (False, True)
-    ),
-    *(UniformReset(), UniformReset(one_gene=True), AlleleMutation(step=1.0, symmetric=True)),
+    *(selection.Tournament(), selection.Tournament(tournament_size=5)),
+    *(selection.InverseRoulette(), selection.DifferenceRoulette(), selection.LinearRanking()),
+    *(selection.FitnessRoulette(fitness_offset=0.5), crossover.OnePoint()),
+    *(crossover.UniformCrossover(), crossover.ArithmeticCrossover()),
+    *(crossover.BlxAlpha(blend_alpha=2.0), StringCrossover(crossover_distance=3.0)),
+    *(mutation.NonUniformMutation(one_gene=own) for own in (False, True)),
+    *(mutation.GaussianMutation(one_gene=own) for own in (False, True)),
+    *(mutation.UniformReset(one_gene=own) for own in (False, True)),
+    mutation.AlleleMutation(step=1.0, symmetric=True),
 )
 
 
@@ -48,7 +29,7 @@ def test_operators_keep_their_obligations(operator: Selection | Crossover | Muta
     check_operator(operator)
 
 
-class Forgetful(OnePoint):
+class Forgetful(crossover.OnePoint):
     """A crossover that does not copy the pairs it does not cross."""
 
     component: ClassVar[str] = "forgetful"
@@ -58,7 +39,7 @@ class Forgetful(OnePoint):
         out[:, : len(parents) // 2] = genomes[:, parents[: len(parents) // 2]]
 
 
-class Escaping(UniformReset):
+class Escaping(mutation.UniformReset):
     """A mutation that leaves the limits."""
 
     component: ClassVar[str] = "escaping"

@@ -56,12 +56,6 @@ def test_roulette_never_draws_a_weight_of_zero(weights: np.ndarray, seed: int) -
     assert (weights[chosen] > 0.0).all() or not weights.any()
 
 
-def expected_copies(costs: np.ndarray, count: int) -> np.ndarray:
-    expected = np.empty(len(costs))
-    scale_costs(costs, count, 2.0, expected)
-    return expected
-
-
 @pytest.mark.parametrize(
     ("costs", "copies"),
     [
@@ -73,4 +67,6 @@ def expected_copies(costs: np.ndarray, count: int) -> np.ndarray:
 def test_infeasible_individuals_expect_nothing_and_equal_ones_the_same(
     costs: list[float], copies: list[float]
 ) -> None:
-    np.testing.assert_allclose(expected_copies(np.array(costs), 4), copies)
+    expected = np.empty(len(costs))
+    scale_costs(np.array(costs), 4, 2.0, expected)
+    np.testing.assert_allclose(expected, copies)

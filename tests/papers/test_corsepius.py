@@ -12,14 +12,11 @@ import pytest
 import report_samples
 from evoexp.configuration import compose
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import trails
 from evoexp.papers.corsepius import claims as paper_claims
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.claims import SizeComparison
-from evoexp.papers.corsepius.figures import (
-    population_effort,
-    posture_motions,
-    solids,
-)
+from evoexp.papers.corsepius.figures import population_effort, posture_motions
 from evoexp.papers.corsepius.measures import ShownPath
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_file import read_page_file
@@ -83,15 +80,15 @@ def test_lengths_and_detours_of_paths(outputs: Path) -> None:
 
 def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
-    table = solids.models_table([("MANUS", condition)])
-    bodies, covers = (table[table["element"] == kind] for kind in (solids.BODY, solids.COVER))
+    table = posture_motions.models_table([("MANUS", condition)])
+    bodies, covers = (table[table["element"] == kind] for kind in ("body", "cover"))
     problem = condition.prepared.problem
     assert list(bodies["name"]) == list(problem.bodies.names)
     assert len(covers) == problem.bodies.num_shapes
-    inner, outer = solids.corners(bodies), solids.corners(covers)
+    inner, outer = trails.corners(bodies), trails.corners(covers)
     assert (inner.min(axis=0) >= outer.min(axis=0) - 1e-9).all()
     assert (inner.max(axis=0) <= outer.max(axis=0) + 1e-9).all()
-    assert can_be_drawn(table, solids.draw_models)
+    assert can_be_drawn(table, posture_motions.draw_models)
 
 
 def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
@@ -182,7 +179,7 @@ def test_a_series_without_points_is_not_in_the_legend() -> None:
 @pytest.mark.matrix
 def test_released_objects_stand_upright_on_the_table(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_pick_and_place").conditions[0]
-    found = measures.releases(condition)
+    found = [*measures.releases(condition)]
     assert found
     assert all(abs(gap) <= 0.001 + 1e-9 and tilt <= 1.0 * DEGREE for gap, tilt in found)
     assert "table – bottle" in measures.allowed_contacts(condition)
@@ -298,7 +295,7 @@ def test_obstacles_that_never_act_say_nothing() -> None:
         assert {claim.name for claim in judged if claim.text.startswith("pose: ")} == names
 
 
-MINIMUM = "wall: the search gets stuck in a local minimum, which a sub-goal opens"
+MINIMUM = "wall: the search gets stuck in a local minimum, and a sub-goal leads out of it"
 STUCK = "The search gets stuck at obstacles: the same goals are met without them"
 MET = "wall: goals in work space are met without inverse kinematics"
 

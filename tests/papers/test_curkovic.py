@@ -10,10 +10,7 @@ import pytest
 from evoexp.condition import Prepared
 from evoexp.configuration import compose
 from evoexp.papers.curkovic import claims, measures
-from evoexp.papers.curkovic.figures import (
-    methods,
-    robot_motions,
-)
+from evoexp.papers.curkovic.figures import methods, robot_motions
 from evoexp.planners.answers import judge_motion
 from evoexp.records import FloatArray
 from evoexp.report.pages.page_builder import page_of

@@ -30,13 +30,7 @@ from evoexp.report.statistics.judging import (
     judge,
 )
 from references.link_crossings_numpy import squared_distance
-from report_samples import (
-    can_be_drawn,
-    page_claims,
-    page_settings,
-    smoke_experiment,
-    smoke_results,
-)
+from report_samples import can_be_drawn, page_claims, page_settings, smoke_experiment, smoke_results
 from shipped_conditions import expanded
 
 LINK, ELLIPSE, BOX = figures.LINK, figures.ELLIPSE, figures.BOX

@@ -1,4 +1,4 @@
-"""The compiled planners of Chen & Zalzala against the same algorithms in plain Python.
+"""The compiled planners of Chen & Zalzala against the same algorithms in plain Python; postures.
 
 Both take the same uniform numbers, so paths and strings of bits are equal, and costs differ by
 rounding alone.
@@ -16,6 +16,7 @@ from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.records import generations
 from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
+from planners.runs import verdict
 from references import chen_python
 
 ROUNDING = 1e-12  # relative, of costs
@@ -149,3 +150,20 @@ def test_postures_do_not_depend_on_how_numbers_and_generations_are_made_in_block
     planner, problem = prepared()
     ga = planner.ga.model_copy(update={"num_generations": 20, "num_elites": 2})
     assert same_postures(planner.model_copy(update={"ga": ga}), problem, 3)
+
+
+def test_postures_are_judged_by_their_bodies() -> None:
+    planner, problem = prepared("scenario=chen_docking_link", "objective=chen_obstacle_link")
+    assert planner.motion(problem, np.array([68.96, 41.74])).q.shape == (2, 4)
+    refuted = verdict(planner, problem, np.array([68.96, 41.74]))
+    assert refuted.certified is False
+    assert "obstacle_1" in refuted.refuted_pair
+    assert verdict(planner, problem, np.array([110.46, -36.09])).certified is True
+
+
+def test_an_infeasible_posture_is_told_as_such() -> None:
+    planner, problem = prepared()
+    terms = planner.evaluate(problem, np.array([0.0, -90.0]))
+    assert [terms[name] for name in ("branch", "cost", "other_cost")] == [-1.0, 250.0, 250.0]
+    assert np.isnan(terms["theta_3_deg"])
+    assert planner.motion(problem, np.array([0.0, -90.0])) is None

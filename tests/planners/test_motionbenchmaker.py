@@ -87,7 +87,7 @@ def test_a_box_as_a_mesh_is_the_same_to_the_last_bit(
     assert (one.digest, one.certified) == (two.digest, two.certified)
     assert one.clearance == pytest.approx(two.clearance, abs=1e-6)
     planner, found = meshes.prepare()
-    (note,) = (line for line in planner.notes(found) if "the verdict is of the convex hu" in line)
+    (note,) = (line for line in planner.notes(found) if "verdict judges their convex hu" in line)
     assert "side_left" in note
 
 
@@ -161,6 +161,6 @@ def test_a_goal_for_a_joint_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_pairs_whose_covers_always_touch_are_named(shipped: dict[str, Condition]) -> None:
     planner, problem = shipped["box_ur5"].prepare()
-    (line,) = (line for line in planner.notes(problem) if "in every posture sampled" in line)
+    (line,) = (line for line in planner.notes(problem) if "in every sampled posture" in line)
     assert "tested by maps of exact distances" in line
     assert "forearm_link with wrist_2_link" in line

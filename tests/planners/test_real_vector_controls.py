@@ -11,7 +11,7 @@ from composed import composed
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import standard_normal
-from evoexp.planners.baselines.real_vector_controls import real_vectors
+from evoexp.planners.baselines.controls import real_vectors
 from evoexp.records import generations
 
 HAS_PYMOO = importlib.util.find_spec("pymoo") is not None

@@ -28,20 +28,17 @@ def found() -> Mission:
     return planner, problem, read_log(run_replicate(mission(), 1).content).solutions[-1].values
 
 
-def end_effector(robot: FloorManipulator, q: np.ndarray) -> np.ndarray:
-    model = robot.build().model
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    return np.asarray(data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0])))
-
-
 def test_the_motion_ends_where_the_task_is(found: Mission) -> None:
     planner, problem, solution = found
     motion, scenario, robot = planner.motion(problem, solution), problem.scenario, mission().robot
     (x, y), (reach, above) = scenario.task_origin, scenario.docking.target
     assert isinstance(robot, FloorManipulator)
     place = [x + reach, y, robot.body_height + above]
-    assert end_effector(robot, motion.q[-1]) == pytest.approx(place, abs=1e-9)
+    model = robot.build().model
+    data = model.createData()
+    pin.forwardKinematics(model, data, motion.q[-1])
+    tip = data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0]))
+    assert tip == pytest.approx(place, abs=1e-9)
     assert motion.q[0, :2].tolist() == list(scenario.grid.start)
     assert np.abs(motion.q[-2, :2] - scenario.grid.goal).max() < 0.5
     assert np.array_equal(motion.q[-2, :2], motion.q[-1, :2])

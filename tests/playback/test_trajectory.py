@@ -156,7 +156,7 @@ def test_ros_reads_the_message() -> None:
 def test_sliding_joints_have_the_unit_of_the_scene_and_ros_has_the_metre_alone() -> None:
     found = uniform("grid")
     assert found.units == ("unit", "unit")
-    line = r"^--format ros: joints that slide must do so in m, was unit$"
+    line = r"^--format ros: sliding joints must be in m, was unit$"
     with pytest.raises(timing.BadTiming, match=line):
         timing.as_ros(found)
 

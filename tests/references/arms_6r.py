@@ -6,12 +6,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+import obstacle_samples as samples
 from evoexp.collision.bodies.body_collision import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     HalfSpaceObstacle,
-    RodObstacle,
     SphereObstacle,
     rotation_matrix,
 )
@@ -21,29 +21,17 @@ FLOOR = 0  # index of the obstacle that the first link stands on: those two are 
 SELF_PAIRS = ((1, 3), (1, 4), (1, 5), (1, 6), (2, 4), (2, 5), (2, 6))
 
 
-def box(*center: float, size: tuple[float, ...], rotation: tuple[float, ...]) -> BoxObstacle:
-    return BoxObstacle(shape="box", center=center, size=size, rotation=rotation)
-
-
-def ball(*center: float, radius: float) -> SphereObstacle:
-    return SphereObstacle(shape="sphere", center=center, radius=radius)
-
-
-def rod(shape: Any, start: tuple[float, ...], end: tuple[float, ...], radius: float) -> RodObstacle:
-    return RodObstacle(shape=shape, start=start, end=end, radius=radius)
-
-
 OBSTACLES = (
-    HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, 0.0), normal=(0.02, -0.03, 1.0)),
-    box(0.75, 0.1, 0.25, size=(0.5, 0.9, 0.06), rotation=(3.0, -4.0, 20.0)),
-    box(-0.45, 0.75, 0.55, size=(0.25, 0.3, 0.5), rotation=(15.0, 10.0, -30.0)),
-    box(0.35, -0.85, 0.9, size=(0.3, 0.12, 0.4), rotation=(40.0, 25.0, 60.0)),
-    rod("cylinder", (-0.75, -0.35, 0.0), (-0.7, -0.3, 1.1), 0.08),
-    rod("cylinder", (0.7, -0.45, 0.5), (0.9, -0.35, 0.75), 0.12),
-    ball(0.6, 0.65, 0.95, radius=0.15),
-    ball(-0.6, 0.05, 1.25, radius=0.12),
-    rod("capsule", (-0.3, 0.9, 1.2), (0.4, 0.85, 1.35), 0.05),
-    rod("capsule", (-0.2, -0.8, 0.3), (-0.4, -0.7, 0.8), 0.07),
+    samples.half_space((0.0, 0.0, 0.0), (0.02, -0.03, 1.0)),
+    samples.box((0.75, 0.1, 0.25), (0.5, 0.9, 0.06), (3.0, -4.0, 20.0)),
+    samples.box((-0.45, 0.75, 0.55), (0.25, 0.3, 0.5), (15.0, 10.0, -30.0)),
+    samples.box((0.35, -0.85, 0.9), (0.3, 0.12, 0.4), (40.0, 25.0, 60.0)),
+    samples.cylinder((-0.75, -0.35, 0.0), (-0.7, -0.3, 1.1), 0.08),
+    samples.cylinder((0.7, -0.45, 0.5), (0.9, -0.35, 0.75), 0.12),
+    samples.sphere((0.6, 0.65, 0.95), 0.15),
+    samples.sphere((-0.6, 0.05, 1.25), 0.12),
+    samples.capsule((-0.3, 0.9, 1.2), (0.4, 0.85, 1.35), 0.05),
+    samples.capsule((-0.2, -0.8, 0.3), (-0.4, -0.7, 0.8), 0.07),
 )
 
 # joint, start, end, radius [m], spheres along it: 11 capsules, 59 spheres

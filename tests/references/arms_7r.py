@@ -9,7 +9,8 @@ import pinocchio as pin
 
 from evoexp.collision.bodies.body_collision import Shapes
 from evoexp.records import FloatArray
-from references.arms_6r import add, ball
+from obstacle_samples import sphere
+from references.arms_6r import add
 
 SELF_PAIRS = tuple(
     pair
@@ -35,7 +36,7 @@ RODS = (
 )
 
 OBSTACLES = tuple(
-    ball(*center, radius=0.12)
+    sphere(center, 0.12)
     for center in (
         *((0.55, 0.0, 0.25), (0.35, 0.35, 0.25), (0.0, 0.55, 0.25), (-0.55, 0.0, 0.25)),
         *((-0.35, -0.35, 0.25), (0.0, -0.55, 0.25), (0.35, -0.35, 0.8), (0.35, 0.35, 0.9)),

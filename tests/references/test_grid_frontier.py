@@ -150,7 +150,7 @@ def test_the_bound_holds_for_paths_through_every_node() -> None:
 
 def test_walks_too_short_to_arrive_are_refused() -> None:
     network = network_of(solvable((6, 6), 0.2, 1, planner()))
-    refusal = r"reference\.max_nodes: must be as many as a path from .*, was 3"
+    refusal = r"reference\.max_nodes: must be at least the number of nodes from .*, was 3"
     with pytest.raises(SettingError, match=refusal):
         best_walk(network, 0.3, 1.0, 1e3, 3)
 

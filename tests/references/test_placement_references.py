@@ -180,16 +180,11 @@ def test_the_programme_and_its_derivatives_are_those_of_complex_steps(
     np.testing.assert_allclose(slow.gradient(smooth, x), plain, rtol=1e-6)
 
 
-def starts_of(case: str, model: Directions, count: int) -> list[np.ndarray]:
-    """Return directions of the lowest minima of a coarse search."""
-    rows = lowest(problem(case).model, AROUND, 60, count)
-    return [model.reaching(np.radians(row[:2]), row[2] == 1.0) for row in rows]
-
-
 @pytest.mark.parametrize("case", ["torque_norm", "obstacle_link", "manipulability"])
 def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
     model = directions(case)
-    starts = starts_of(case, model, 6)
+    rows = lowest(problem(case).model, AROUND, 60, 6)  # the lowest minima of a coarse search
+    starts = [model.reaching(np.radians(row[:2]), row[2] == 1.0) for row in rows]
     steps = 0.3 / np.sqrt(np.arange(1.0, 41.0))
     ends, costs = slide(np.array(2 * starts).T, steps, model)
     for k, start in enumerate(starts):

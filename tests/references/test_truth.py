@@ -14,11 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from composed import composed
 from evoexp.batch import replicate
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduction import (
-    farthest,
-    field_differences,
-    fingerprint,
-)
+from evoexp.batch.reproduction import farthest, field_differences, fingerprint
 from evoexp.batch.runner import Batch
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.cli import main

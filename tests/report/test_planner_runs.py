@@ -185,7 +185,7 @@ def test_planners_of_several_problems_are_named_by_their_components(
     page = comparison.page(gather(stored, conditions, None, "", "", ""), settings)
     assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "targets_by_problem"]
     headings = [table.heading for table in page.tables]  # no problem has all planners
-    assert headings == ["Problems", "Answers", "The same in other coins"]
+    assert headings == ["Problems", "Answers", "Other measures of effort and cost"]
     planners = set(page.drawings[0].table()["planner"])
     assert all(p.startswith(("via_point_ga", "random_search", "multi_start")) for p in planners)
 
@@ -357,7 +357,7 @@ def test_the_page_says_why_there_is_no_test_or_no_ranking(settings: ReportSettin
     assert "not ranked" in remark and (notes, stems) == ("", [])
     remark, notes, stems = page_parts("pqrs", "ABC")
     assert "not ranked" not in remark and stems == ["performance_profiles"]
-    assert "5 problems that all of them were run on; here are 3 planners and 4" in notes
+    assert "5 problems that all of them ran; here are 3 planners and 4" in notes
     remark, notes, stems = page_parts("pqrst", "ABC")
     assert "not ranked" not in remark and stems == ["performance_profiles", "critical_difference"]
     assert "the planners rank differently" in notes and "unit of a ranking" in notes

@@ -151,15 +151,6 @@ def chain(*joints: DhJoint, **settings: Any) -> DhChain:
     return DhChain(**(plain | settings))
 
 
-def denavit_hartenberg(row: tuple[float, float, float, float], q: float) -> np.ndarray:
-    """The matrix as textbooks print it."""
-    a, alpha, d, theta = row[0], np.deg2rad(row[1]), row[2], np.deg2rad(row[3]) + q
-    s, c, sa, ca = np.sin(theta), np.cos(theta), np.sin(alpha), np.cos(alpha)
-    return np.array(
-        [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1.0]]
-    )
-
-
 @pytest.mark.parametrize("experiment", ["corsepius_ball", "corsepius_shelf", "corsepius_gate_wide"])
 def test_the_tool_is_where_the_table_puts_it(experiment: str) -> None:
     robot = composed(f"experiment={experiment}").robot
@@ -170,7 +161,11 @@ def test_the_tool_is_where_the_table_puts_it(experiment: str) -> None:
         q = rng.uniform(assembly.model.lowerPositionLimit, assembly.model.upperPositionLimit)
         expected = base
         for joint, value in zip(robot.joints, q, strict=True):
-            expected = expected @ denavit_hartenberg(joint.dh, value)
+            a, alpha, d, theta = joint.dh
+            s, c = np.sin(np.deg2rad(theta) + value), np.cos(np.deg2rad(theta) + value)
+            sa, ca = np.sin(np.deg2rad(alpha)), np.cos(np.deg2rad(alpha))
+            x, y = [c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s]
+            expected = expected @ np.array([x, y, [0, sa, ca, d], [0, 0, 0, 1.0]])
         expected, pose = expected @ tool, tool_pose(assembly, q)
         assert np.abs(pose[:9].reshape(3, 3) - expected[:3, :3]).max() < 1e-12
         assert np.abs(pose[9:] - expected[:3, 3]).max() < 1e-12

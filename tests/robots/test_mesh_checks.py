@@ -247,16 +247,6 @@ def angle_iron() -> bytes:
     return "\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in faces)]).encode()
 
 
-def surface_points(count: int) -> np.ndarray:
-    corners, triangles = meshes.loaded_mesh(angle_iron(), ".obj", "test")
-    rng = np.random.default_rng(2)
-    a, b, c = corners[triangles].transpose(1, 0, 2)
-    area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
-    chosen = rng.choice(len(triangles), size=count, p=area / area.sum())
-    shares = rng.dirichlet(np.ones(3), count)
-    return np.einsum("pc,pcx->px", shares, corners[triangles][chosen])
-
-
 def pieces_of(content: bytes) -> list[coal.Convex]:
     return meshes.read_pieces(content, np.ones(3), "test")
 
@@ -264,7 +254,13 @@ def pieces_of(content: bytes) -> list[coal.Convex]:
 def standing_out(pieces: list[coal.Convex], count: int) -> float:
     """The greatest distance of points of the L from the nearest of some pieces, by coal."""
     bodies = [placed(piece) for piece in pieces]
-    points = surface_points(count)
+    corners, triangles = meshes.loaded_mesh(angle_iron(), ".obj", "test")
+    rng = np.random.default_rng(2)
+    a, b, c = corners[triangles].transpose(1, 0, 2)
+    area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
+    chosen = rng.choice(len(triangles), size=count, p=area / area.sum())
+    shares = rng.dirichlet(np.ones(3), count)
+    points = np.einsum("pc,pcx->px", shares, corners[triangles][chosen])
     return max(min(distance_of_point(point, body) for body in bodies) for point in points)
 
 

@@ -92,10 +92,10 @@ def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
         assert place.isApprox(expected, 1e-12)
 
 
-NO_MESH = "robot.path: must be a file whose meshes are there, was \"a missing mesh 'package://ur5_l"
+NO_MESH = "robot.path: must be a file whose meshes exist, was \"a missing mesh 'package://ur5_l"
 KIND = "fixed, floating or planar, was \"joint 'elbow_joint' of type spherical\""
 LIMIT = "robot.joint_limits: must be given for every joint: postures are drawn between them, and"
-RULE = "robot.path: must be a URDF whose joints follow joints that are there, was \"'"
+RULE = "robot.path: must be a URDF whose joints follow joints that exist, was \"'"
 
 
 @pytest.mark.examples(2)
@@ -150,7 +150,7 @@ def test_spheres_of_others_stand_where_their_file_has_them(tmp_path: Path) -> No
     # other links are covered as asked
     assert other.uncovered == 0.0 < cover.uncovered
     notes = " | ".join(condition.planner.notes(problem))
-    assert "given spheres do not contain all bodies; standing out [m]: " in notes
+    assert "given spheres do not contain all bodies; uncovered [m]: " in notes
     assert "forearm_link 0." in notes
 
 

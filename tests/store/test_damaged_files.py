@@ -39,12 +39,6 @@ def log_of(config: bytes, replicate: int, files: dict[str, bytes] | None = None)
     return log.finish(SUMMARY._replace(replicate=replicate, condition=condition)).content
 
 
-def other_run(outputs: Path) -> RunDirectory:
-    run = RunDirectory(outputs, hashlib.sha256(OTHER).hexdigest())
-    run.create(OTHER, {})
-    return run
-
-
 def empty(path: Path) -> None:
     path.write_bytes(b"")
 
@@ -254,7 +248,8 @@ def test_damage_is_named_and_a_damaged_run_hides_no_other(
     for action in (run.check, run.config_json, create, lambda: resolve(tmp_path, run.hash12)):
         with pytest.raises(StoreError, match=r"config\.json: damaged"):
             action()
-    other = other_run(tmp_path)
+    other = RunDirectory(tmp_path, hashlib.sha256(OTHER).hexdigest())
+    other.create(OTHER, {})
     assert [each.path for each in find_runs(tmp_path)] == [other.path]
     assert resolve(tmp_path, other.hash12).path == other.path
     (run.path / "config.json").unlink()

@@ -39,14 +39,10 @@ NUM_LOGS = counts(10_000, 100_000) if matrices_are_asked_for() else 300
 LITTLE, MOST = 500, 10 * log_reader.MAX_LOG // 2**20
 
 
-def whole_log() -> bytes:
-    """Return a log with everything that a log may hold."""
-    rows = generations(40)
-    rows[2] = rows[2]._replace(arrays={"landscape": np.arange(12.0).reshape(3, 4)})
-    return write(rows, fronts=[FrontRow(3, 0, np.array([[1.0, np.inf], [2.0, 0.5]]))]).content
-
-
-CONTENT = whole_log()
+ROWS = generations(40)
+ROWS[2] = ROWS[2]._replace(arrays={"landscape": np.arange(12.0).reshape(3, 4)})
+# a log with everything that a log may hold
+CONTENT = write(ROWS, fronts=[FrontRow(3, 0, np.array([[1.0, np.inf], [2.0, 0.5]]))]).content
 
 
 def attempt(content: bytes) -> list[str]:
@@ -91,7 +87,7 @@ def zeros(size: int) -> bytes:
 def test_a_chunk_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     (parts, chunk), size = opened(), 3 * 10**9
     chunk.frame = zeros(size)
-    for told, reason in ((size, "at most"), (1000, "size that it tells")):
+    for told, reason in ((size, "at most"), (1000, "size that it states")):
         chunk.size = told
         bomb = anatomy.put_together(parts)
         assert len(bomb) < 150_000
@@ -203,14 +199,14 @@ def test_an_index_that_points_elsewhere() -> None:
     ):
         refusals = attempt(anatomy.put_together(parts, summary))
         assert len(refusals) == len(READERS)
-        assert all("index does not tell the records" in text for text in refusals)
+        assert all("index does not list the records" in text for text in refusals)
 
 
 def test_a_file_that_is_too_large_or_no_file(tmp_path: Path) -> None:
     path = tmp_path / "0000.mcap"
     with open(path, "wb") as file:
         file.truncate(3 * 10**9)
-    for source, reason in ((path, "larger than 128 MB"), (Path("/dev/zero"), "no regular file")):
+    for source, reason in ((path, "larger than 128 MB"), (Path("/dev/zero"), "not a regular file")):
         for reader in READERS:
             with pytest.raises(CorruptLog, match=reason):
                 reader(source)

@@ -122,10 +122,6 @@ def test_a_table_of_old_and_new_rows_is_that_of_all(
     assert [row["replicate"] for row in mixed.to_pylist()] == [*range(9), 11, 12]
 
 
-def without_a_column(path: Path) -> None:
-    pq.write_table(pq.read_table(path).drop_columns("solved"), path)
-
-
 def test_a_table_of_another_version_is_rebuilt(
     run: RunDirectory, add: Add, reads: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -144,7 +140,9 @@ REPLACED = {
     "a directory": lambda path: (path.unlink(), path.mkdir()),
     "a pipe": lambda path: (path.unlink(), os.mkfifo(path)),
     "no table": lambda path: path.unlink(),
-    "without a column": without_a_column,
+    "without a column": lambda path: pq.write_table(
+        pq.read_table(path).drop_columns("solved"), path
+    ),
 }
 
 

@@ -140,7 +140,7 @@ FAULTS: dict[str, list[tuple[dict[str, Any], str]]] = {  # obligation → what b
         (every(best=lambda g: g.best[:-1]), "documents, ((21, 2), (21, 2)); was 83"),
     ],
     "recorded_costs_are_those_of_the_population": [
-        (every(costs=lambda g: g.costs + 1.0), "of generation 0 must be those that cost gives its"),
+        (every(costs=lambda g: g.costs + 1.0), "of generation 0 must equal what cost returns"),
     ],
     "terms_agree_with_evaluate": [
         (every(terms=lambda g: {"collisions": -1.0}), "of the best solution, -1.0"),
@@ -153,7 +153,7 @@ FAULTS: dict[str, list[tuple[dict[str, Any], str]]] = {  # obligation → what b
     ],
     "the_last_population_is_left_alone": [({"evolve": changing_after_the_end}, "after evolve")],
     "the_same_seed_gives_the_same_bits": [({"evolve": remembering}, "agree in every bit")],
-    "samples_are_judged_alike": [({"cost": by_position}, "the same alone and among others")],
+    "samples_are_judged_alike": [({"cost": by_position}, "the same for an individual alone")],
     "the_local_operator_leaves_its_argument_alone": [
         ({"improve": changing_its_argument}, "improve must leave the given population as it is"),
     ],

@@ -3,21 +3,14 @@
 Kernels of conditions are compiled, or loaded, before their replicates are timed: each kind of
 condition searches for two generations and judges a motion; the server of worker processes does so
 before it forks them.
-
-With workers of a cluster of `distributed` nothing is shared but the network. Each task tells which
-code asked for it; a worker with other code refuses it, as its results could be others.
 """
 
 import contextlib
 import functools
-import hashlib
 import itertools
 import json
-import logging
 import os
 import re
-import socket
-import threading
 import time
 import traceback
 from collections import deque
@@ -27,12 +20,9 @@ from typing import Any, NamedTuple
 
 from evoexp.attachments import keep_all
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
-from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import DIED_TWICE, Died, Workers
 from evoexp.condition import Condition
-from evoexp.errors import EvoexpError, printable
 from evoexp.records import Block, ReplicateSummary, generations
-from evoexp.version import __version__
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
@@ -41,9 +31,6 @@ _NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
 TASK_S = 0.2
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
-AHEAD = 2  # tasks per worker that are sent before earlier ones come back
-DEATHS = 1  # of workers that a task may cause and still be tried again
-_ALONE = threading.Lock()  # a worker of several threads runs one replicate at a time
 INTERVAL_S = 0.2  # [s] between two files of a worker
 NUM_POINTS = 48  # of a curve, at most
 
@@ -108,7 +95,8 @@ def run_jobs(
         except Exception as error:
             trace = traceback.format_exc()
             is_late = isinstance(error, TookTooLong)
-            reason = str(error) if is_late else f"{type(error).__name__}: {error}".splitlines()[0]
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            reason = limits.reason if is_late else reason
             may_pass = is_late or isinstance(error, MemoryError)
         wall_s = time.perf_counter() - start
         outcomes.append(Outcome(*job.key, reason, trace, content, wall_s, summary, may_pass))
@@ -133,14 +121,14 @@ def one_of_each_kind(jobs: Iterable[Job]) -> list[Job]:
     return list({_NUMBER.sub(b"0", text): job for text, job in texts.items()}.values())
 
 
-def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
+def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits, *, in_worker: bool = False) -> None:
     """Run every kernel that the conditions of jobs need; errors are left to the replicates."""
     from evoexp.paths.motion import Motion  # and numba
     from evoexp.planners.answers import judge_motion
 
     limits = limits._replace(timeout_s=max(limits.timeout_s or 0.0, COMPILING_S))
     for job in jobs:
-        with contextlib.suppress(Exception), limited(limits, in_worker=False):
+        with contextlib.suppress(Exception), limited(limits, in_worker=in_worker):
             condition = condition_of(job)
             planner, problem = condition.prepare()
             # a reference takes long; it needs the kernels of the planner beside it
@@ -154,7 +142,7 @@ def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
                 judge_motion(searching, problem, Motion(motion.q[[0, 0]]))
 
 
-# many replicates: in workers of this machine, or of a cluster
+# many replicates
 
 
 def fan_out(
@@ -188,7 +176,7 @@ class Replicates:
     """
 
     def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
-        self._limits, self._num_workers, self._waiting = limits, num_workers, deque(jobs)
+        self._limits, self.num_workers, self._waiting = limits, num_workers, deque(jobs)
         self._seconds, self._count = 0.0, 0.0  # of the replicates that ended of late
         self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
         self._last: deque[Job] = deque()  # to be run a last time
@@ -200,7 +188,7 @@ class Replicates:
             return ([self._suspects.popleft()],)
         if self._waiting:
             mean = self._seconds / self._count if self._count else 0.0
-            fair = -(-len(self._waiting) // (2 * self._num_workers))
+            fair = -(-len(self._waiting) // (2 * self.num_workers))
             size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
             return ([self._waiting.popleft() for _ in range(min(size, len(self._waiting)))],)
         return ([self._last.popleft()],) if self._last and not num_running else None
@@ -215,7 +203,8 @@ class Replicates:
             reason, timeout_s = DIED_TWICE, self._limits.timeout_s
             if timeout_s is not None and end.seconds >= timeout_s:
                 reason = f"{self._limits.reason}, in compiled code: its process was ended"
-            trace = f"The worker process was terminated {end.seconds:.1f} s after it began."
+            after = f" {end.seconds:.1f} s after it began" if end.seconds else ""
+            trace = f"The worker process was terminated{after}."
             end = [Outcome(*jobs[0].key, reason, trace, b"", end.seconds, may_pass=True)]
         # jobs that the task did not begin wait again; earlier times count half from now on, so
         # that slow first jobs are soon forgotten
@@ -230,107 +219,6 @@ class Replicates:
             else:
                 final.append(outcome)
         return final
-
-
-class ClusterError(EvoexpError):
-    """A cluster that cannot be used."""
-
-
-def cluster_fan_out(
-    jobs: Sequence[Job], settings: RunnerSettings, limits: ReplicateLimits = NO_LIMITS
-) -> Iterator[list[Outcome]]:
-    """Run jobs on a cluster; yield outcomes as they come.
-
-    Replicates are run again as in `fan_out`. A scheduler blames whatever waits on a worker that
-    dies: the last time, a replicate runs beside no other.
-    """
-    try:
-        import distributed
-    except ImportError:
-        must = "runner=dask needs distributed: pip install 'evoexp[cluster]'"
-        raise ClusterError(must) from None
-    # a lost scheduler is told below, in one line
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-    with _client(distributed, settings) as client:
-        num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-        replicates = Replicates(jobs, num_workers, limits)
-        sent: dict[str, tuple[list[Job]]] = {}  # by the key of the task
-        running: Any = distributed.as_completed(loop=client.loop)
-        while True:
-            while len(sent) < AHEAD * num_workers and (task := replicates.next_task(len(sent))):
-                arguments = (code_identity(), *task, limits)
-                future = client.submit(run_checked, *arguments, pure=False, retries=0)
-                sent[future.key] = task
-                running.add(future)
-            if not sent:
-                return
-            future = next(running)
-            try:
-                end = future.result()
-            except distributed.scheduler.KilledWorker:
-                end = Died(0.0)  # the scheduler does not tell when it began
-            except (ModuleNotFoundError, distributed.CancelledError) as error:
-                reason = printable(str(error).splitlines()[0])
-                if "scheduler-" in reason:  # connection-lost, restart
-                    raise ClusterError(
-                        f"runner.address: the scheduler at {client.scheduler.address} went away; "
-                        "finished replicates are stored: run again for the others"
-                    ) from None
-                must = f"runner.address: a worker cannot run evoexp: {reason}"
-                raise ClusterError(must) from None
-            finally:
-                future.release()
-            if outcomes := replicates.end_task(sent.pop(future.key), end):
-                yield outcomes
-
-
-def run_checked(code: str, jobs: Sequence[Job], limits: ReplicateLimits) -> list[Outcome]:
-    """Run replicates in a worker of a cluster, if its code is that which asks for them."""
-    if code != code_identity():
-        raise ClusterError(
-            f"runner.address: the worker on {socket.gethostname()} must have evoexp {code}, has "
-            f"{code_identity()}"
-        )
-    with _ALONE:
-        return run_jobs(jobs, limits, in_worker=True)
-
-
-@functools.cache
-def code_identity() -> str:
-    """Return version and hash of evoexp's code, wherever it is installed."""
-    root, digest = Path(__file__).parents[1], hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes())
-    return f"{__version__} ({digest.hexdigest()[:12]})"
-
-
-@contextlib.contextmanager
-def _client(distributed: Any, settings: RunnerSettings) -> Iterator[Any]:
-    """Connect to a scheduler, or to workers on this machine that end with the body."""
-    if settings.address is not None:
-        try:
-            client = distributed.Client(settings.address, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            reason = printable(str(error).splitlines()[0]) if str(error) else "no answer"
-            must = "runner.address: must be the address of a scheduler that answers"
-            raise ClusterError(f"{must}, was {printable(settings.address)} ({reason})") from None
-        with client:
-            yield client
-        return
-    import dask
-
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": DEATHS}),
-        distributed.LocalCluster(
-            n_workers=settings.num_workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
 
 
 # convergence of running replicates: each worker leaves it in a file, now and then

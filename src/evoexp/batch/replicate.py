@@ -61,7 +61,7 @@ def run_replicate(
     if last is None:
         raise SettingError(
             "budget.collision_queries",
-            f"at least what the initial population asks for ({block.collision_queries[0]:,})",
+            f"at least the queries of the initial population ({block.collision_queries[0]:,})",
             condition.max_collision_queries,
         )
     judged = _judged(planner, problem, last)

@@ -5,6 +5,7 @@ whose replicate does not end so is ended as a whole.
 """
 
 import contextlib
+import ctypes
 import faulthandler
 import os
 import resource
@@ -62,24 +63,31 @@ def _in_time(limits: ReplicateLimits, in_worker: bool) -> Iterator[None]:
         return
 
     def tell(number: int, frame: Any) -> None:
-        raise TookTooLong(limits.reason)
+        raise TookTooLong
 
+    late = ctypes.c_ulong(threading.get_ident()), ctypes.py_object(TookTooLong)
+    timer = threading.Timer(seconds, ctypes.pythonapi.PyThreadState_SetAsyncExc, late)
+    timer.daemon = True
     with open(os.devnull, "w") as nowhere:
         if in_worker:  # a thread of C, which needs nothing of the interpreter
-            latest = seconds + GRACE_S if is_main else seconds
-            faulthandler.dump_traceback_later(latest, exit=True, file=nowhere)
-        before = signal.signal(signal.SIGALRM, tell) if is_main else None
+            faulthandler.dump_traceback_later(seconds + GRACE_S, exit=True, file=nowhere)
         if is_main:
+            before = signal.signal(signal.SIGALRM, tell)
             signal.setitimer(signal.ITIMER_REAL, seconds)
+        else:
+            timer.start()
         try:
             yield
         finally:
-            # where an interruption has the timer now, it keeps it
-            if is_main and signal.getsignal(signal.SIGALRM) is tell:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-                signal.signal(signal.SIGALRM, before)
             if in_worker:
                 faulthandler.cancel_dump_traceback_later()
+            if not is_main:
+                timer.cancel()
+                timer.join()  # what it raises is raised by now
+            # where an interruption has the timer now, it keeps it
+            elif signal.getsignal(signal.SIGALRM) is tell:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+                signal.signal(signal.SIGALRM, before)
 
 
 def allowed_addresses() -> int | None:

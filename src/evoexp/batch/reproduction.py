@@ -17,7 +17,7 @@ from evoexp.attachments import PREFIX, keep_all
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.batch.runner_settings import machine_memory, refuse_large
 from evoexp.condition import Condition
-from evoexp.errors import CorruptLog, EvoexpError, MissingDistribution
+from evoexp.errors import CorruptLog, EvoexpError, MissingDistribution, brief
 from evoexp.planners.answers import judge_motion
 from evoexp.records import TIMES, ReplicateSummary, flatten
 from evoexp.registry import missing
@@ -60,8 +60,7 @@ class FieldDifference(NamedTuple):
             return f"{self.name} differs by {self.size:.1e}"
         if not all(isinstance(value, _PLAIN) for value in (self.was, self.now)):
             return f"{self.name} differs"
-        texts = (repr(self.was), repr(self.now))
-        was, now = (t if len(t) <= _LONGEST else f"{t[:_LONGEST]}…" for t in texts)
+        was, now = (brief(repr(value), _LONGEST) for value in (self.was, self.now))
         return f"{self.name} was {was}, is {now}"
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from evoexp.batch import jobs
+from evoexp.batch.cluster import cluster_fan_out
 from evoexp.batch.jobs import Job, Outcome
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import GIGABYTE, RunnerSettings, allowed_memory, refuse_large
@@ -120,7 +121,7 @@ class Batch:
         elif self._settings.address is None:  # else the workers are elsewhere
             jobs.warm_kernels(kinds, limits)
         if self._settings.backend == "dask":
-            return jobs.cluster_fan_out(self.jobs, self._settings, limits)
+            return cluster_fan_out(self.jobs, self._settings, limits)
         return jobs.fan_out(self.jobs, workers, limits, self._curves)
 
     @property

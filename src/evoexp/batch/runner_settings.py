@@ -71,7 +71,7 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     num_records = planner.num_generations + 1
     if num_records * LEAST_RECORD > MAX_LOG:
         most = MAX_LOG // LEAST_RECORD
-        must = f"of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
+        must = f"one of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
         raise SettingError("planner", must, num_records)
     needed = replicate_memory(condition)
     if needed > allowed:

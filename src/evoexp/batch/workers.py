@@ -149,7 +149,7 @@ class Workers:
                 worker.pipe.close()
                 self._num_lost += worker.process is None
                 if self._num_lost > MOST_LOST * self.number:
-                    raise WorkerError("worker processes die before they have begun") from None
+                    raise WorkerError("worker processes die before they start") from None
             if message is not None and worker.process is None:
                 worker.process, self._num_lost = message, 0
             elif task is not None:

@@ -5,10 +5,10 @@ the obstacles the unsafeness of a node; it is the collision model by which its p
 """
 
 from itertools import pairwise
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.errors import demand
 from evoexp.paths.grids import UNREACHED, Grid, front, grid
@@ -43,8 +43,6 @@ class Fields(NamedTuple):
 class PotentialFields(Component):
     """Potentials after so many steps of the wave fronts."""
 
-    component: ClassVar[str] = "potential_fields"
-
     neighbourhood: Count  # p: a step of a front changes at most so many coordinates
     # d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with the last
     # difference
@@ -55,14 +53,12 @@ class PotentialFields(Component):
     # S_* of Eq. 3: no path may pass a node of a greater one; None: any
     max_unsafeness: float | None = None
 
-    @model_validator(mode="after")
-    def _potentials_are_ordered(self) -> Self:
+    def _check(self) -> None:
         goal, obstacle = list(self.goal_potentials), list(self.obstacle_potentials)
         rises = all(a < b for a, b in pairwise(goal))
         demand(rises, "goal_potentials", "ascending: d1 < d2 < …", goal)
         falls = all(a >= b for a, b in pairwise(obstacle))
         demand(falls, "obstacle_potentials", "descending: o0 ≥ o1 ≥ …", obstacle)
-        return self
 
     def bind(self, blocked: np.ndarray) -> Fields:
         """Return the fields of an occupancy grid (nodes along x, y[, z]), true for obstacles."""

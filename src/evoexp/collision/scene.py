@@ -1,6 +1,6 @@
 """A scene: a robot's exact bodies and the obstacles as coal shapes, with the pairs to be watched.
 
-`Scene` holds coal's shapes, which have the last word, and the same bodies as plain arrays, from
+`Scene` holds coal's shapes, which decide, and the same bodies as plain arrays, from
 which the kernels of the certifier bound their distances. It is read-only: one scene serves many
 motions and threads.
 """
@@ -21,16 +21,7 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.robots.meshes import convex_shape
-from evoexp.scenarios.obstacles import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    ELLIPSE,
-    SPHERE,
-    ObstacleTable,
-    obstacle_hulls,
-    obstacle_table,
-)
+from evoexp.scenarios import obstacles as solids
 
 
 class AllowedContact(NamedTuple):
@@ -68,19 +59,18 @@ class Scene(NamedTuple):
         return self.names[one], self.names[two]
 
     def of_pairs(self, kept: np.ndarray) -> "Scene":
-        """Return the scene with those of its pairs that are kept, (pairs,)."""
+        """Return the scene with the kept pairs only, (pairs,)."""
         return self._replace(pairs=self.pairs[kept], tolerances=self.tolerances[kept])
 
-    def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
-        """Return the names of the two bodies that are closest, or overlap most, at q (nq,)."""
+    def distances(self, q: FloatArray) -> FloatArray:
+        """Return coal's distances of all pairs of the geometry at q (nq,), negative: overlaps."""
         data, placements = self.model.createData(), self.geometry.createData()
         pin.computeDistances(self.model, data, self.geometry, placements, q)
-        distances = [result.min_distance for result in placements.distanceResults]
-        return self.pair_names(int(np.argmin(distances)))
+        return np.array([result.min_distance for result in placements.distanceResults])
 
 
 class Part(NamedTuple):
-    """A piece of a motion that has bodies of its own: a phase in which something is held, say."""
+    """A piece of a motion with its own bodies, such as a phase in which something is held."""
 
     scene: Scene  # the bodies
     first: int  # instant at which it begins
@@ -91,7 +81,9 @@ class Part(NamedTuple):
 
 
 def scene(
-    assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), self_pairs: bool = False
+    assembly: Assembly,
+    obstacles: solids.ObstacleTable | tuple[Any, ...] = (),
+    self_pairs: bool = False,
 ) -> Scene:
     """Return a robot among obstacles: links of different arms, and every link with every obstacle.
 
@@ -101,10 +93,10 @@ def scene(
         self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they
             meet at a joint, or the robot's own data says that they need not be.
     """
-    if isinstance(obstacles, ObstacleTable):
+    if isinstance(obstacles, solids.ObstacleTable):
         table, hulls = obstacles, {}
     else:
-        table, hulls = obstacle_table(obstacles), obstacle_hulls(obstacles)
+        table, hulls = solids.obstacle_table(obstacles), solids.obstacle_hulls(obstacles)
     geometry, counts = pin.GeometryModel(), [0] * assembly.num_arms
     bodies = list(assembly.geometry.geometryObjects)
     arms = assembly.body_arms
@@ -163,7 +155,7 @@ def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = Non
 
 
 def obstacle_shapes(
-    table: ObstacleTable, hulls: Mapping[int, FloatArray] | None = None
+    table: solids.ObstacleTable, hulls: Mapping[int, FloatArray] | None = None
 ) -> list[tuple[Any, Any]]:
     """Return every obstacle as a coal shape and its placement, a `pin.SE3`.
 
@@ -177,15 +169,15 @@ def obstacle_shapes(
                 must = "points that lie in no plane"
                 raise SettingError(f"scenario.obstacles[{k}].points", must, hulls[k].tolist()[:4])
             shape = convex_shape(*found)
-        elif kind == SPHERE:
+        elif kind == solids.SPHERE:
             shape = coal.Sphere(a)
-        elif kind == BOX:
+        elif kind == solids.BOX:
             shape = coal.Box(2.0 * a, 2.0 * b, 2.0 * c)
-        elif kind == CAPSULE:
+        elif kind == solids.CAPSULE:
             shape = coal.Capsule(a, 2.0 * b)
-        elif kind == CYLINDER:
+        elif kind == solids.CYLINDER:
             shape = coal.Cylinder(a, 2.0 * b)
-        elif kind == ELLIPSE:
+        elif kind == solids.ELLIPSE:
             shape = coal.Ellipsoid(a, b, c)
         else:
             shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)

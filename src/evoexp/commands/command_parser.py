@@ -24,8 +24,8 @@ MODULES = dict.fromkeys(("view", "play", "export", "evaluate"), "chosen_motions"
 MODULES |= dict.fromkeys(("verify", "clean"), "store_care")
 MODULES |= {"claims": "report", "list": "list_", "pack": "stored_runs"}
 HYDRAS_OPTIONS = {
-    "--cfg": "evoexp show experiment=NAME; with --all every setting",
-    "--info": "evoexp show experiment=NAME; evoexp list",
+    "--cfg": "evoexp show experiment=NAME, with --all for every setting",
+    "--info": "evoexp show experiment=NAME, or evoexp list",
     "--resolve": "evoexp show --all experiment=NAME",
     "--package": "evoexp show --all experiment=NAME",
     "--run": "evoexp run experiment=NAME",
@@ -92,7 +92,7 @@ class CommandParser(argparse.ArgumentParser):
             known = re.findall(r"(?<![\w-])--?[a-z][\w-]*", "\n".join(lines))
             instead = HYDRAS_OPTIONS.get(word.partition("=")[0])
             message = f"no option '{word}'{nearest(word, known)} (options: {', '.join(known)})"
-            message = f"no option '{word}': {instead}" if instead else message
+            message = f"no option '{word}'; use {instead}" if instead else message
         self.exit(2, f"evoexp: {message}\n")
 
 

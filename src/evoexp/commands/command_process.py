@@ -36,7 +36,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 from evoexp.batch.replicate_limits import allowed_addresses
-from evoexp.errors import DamagedStore, printable
+from evoexp.errors import Notice, printable
 from evoexp.numeric.cache_folder import remove_at_exit
 
 OUTPUT = "standard output"  # the file name of its errors
@@ -85,7 +85,7 @@ def refuse_too_little_memory() -> None:
     """Refuse limits with which libraries or the compiler end the process, or never come back."""
     allowed = allowed_addresses()
     if allowed is not None and allowed < LEAST_MB * MEGABYTE:
-        raise MemoryError(f"a command needs {LEAST_MB:,} MB of addresses at least")
+        raise MemoryError(f"a command needs at least {LEAST_MB:,} MB of address space")
 
 
 def memory_shortage(error: BaseException) -> str:
@@ -143,20 +143,20 @@ def complain(text: str) -> None:
 
 
 @contextlib.contextmanager
-def damage_in_lines() -> Iterator[None]:
-    """Print warnings of damaged files as `evoexp: …`, each line once, while the body runs."""
+def notices_in_lines() -> Iterator[None]:
+    """Print notices as `evoexp: …`, each line once, while the body runs."""
     said: set[str] = set()
     with warnings.catch_warnings():
         shown = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
-            if not issubclass(category, DamagedStore):
+            if not issubclass(category, Notice):
                 shown(message, category, *place, **rest)
             elif (text := " ".join(str(message).split())) not in said:
                 said.add(text)
                 print(f"evoexp: {printable(text)}", file=sys.stderr)
 
-        warnings.simplefilter("always", DamagedStore)
+        warnings.simplefilter("always", Notice)
         warnings.showwarning = show
         yield
 

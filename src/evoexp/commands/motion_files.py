@@ -111,8 +111,8 @@ def _fitting(label: str, condition: Condition, values: Any) -> FittingMotion:
     motion, remarks = fitted(values, joints, condition.length_unit)
     if len(planner.parts(problem, motion)) > 1:
         raise ValueError(
-            f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
-            "tell; give the solution (evaluate HASH --write FILE.json)"
+            f"{label}: bodies are picked up or put down on the way, which a trajectory cannot "
+            "hold; give the solution (evaluate HASH --write FILE.json)"
         )
     return FittingMotion(label, condition, np.empty(0), motion, (JUDGED, *remarks))
 

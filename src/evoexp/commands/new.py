@@ -38,7 +38,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise SettingError("NAME", must, name)
     known = {*names(COMPONENTS), *(option for group in GROUPS for option in options(group))}
     if name in known or name == "evoexp":
-        raise SettingError("NAME", "a new name: a component or an option has this one", name)
+        raise SettingError("NAME", "a new name: a component or option has it already", name)
     if root.exists():
         raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
     if find_spec(name) is not None:

@@ -90,7 +90,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json([row._asdict() for row in planned])
         return 0
-    counts = right("planned", "there", "to run", "failed\nbefore", "damaged")
+    counts = right("planned", "stored", "to run", "failed\nbefore", "damaged")
     costs = right("CPU s\neach", "GB\neach")
     table = new_table("", "condition", hash_column(), *counts, "other revision", *costs)
     for row in planned:
@@ -118,7 +118,7 @@ def _total(rows: Sequence[PlannedCondition], workers: int) -> str:
     missing, failed = sum(row.missing for row in rows), sum(row.failed for row in rows)
     again = f"{failed} failed before, which start with --retry-failed" if failed else ""
     if not missing:
-        return f"nothing to run{f': {again}' if failed else ': every replicate is there'}"
+        return f"nothing to run{f': {again}' if failed else ': every replicate is stored'}"
     todo = [row for row in rows if row.missing]
     known = [row for row in todo if row.cpu_s_each is not None]
     bounds = attrgetter("cpu_s_each", "cpu_s_least", "cpu_s_most")

@@ -174,7 +174,7 @@ def request_of(
     words = [experiment.name] if experiment.name in options("experiment") else []
     words = files if any(map(is_file, files)) else words
     words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
-    words += [word for word in overrides if word.split("=")[0] not in _SILENT]
+    words += [word for word in overrides if re.split("=|(?<=^runner)[.]", word)[0] not in _SILENT]
     words += again
     return build.Request(
         experiment.report_name,

@@ -26,8 +26,8 @@ def main(arguments: argparse.Namespace) -> int:
         with stored_runs.looked_into(*packed) as runs:
             rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
         code = _report(rows)
-        told = f"{printable(str(packed[0]))}: its logs were compared where they are; nothing was"
-        say(f"{told} taken into {outputs_root()}")
+        told = f"{printable(str(packed[0]))}: its logs were compared in place; nothing was"
+        say(f"{told} added to {outputs_root()}")
         return code
     if path.suffix == ".mcap" or path.is_file():
         return _report([reproduce_log(path)])

@@ -65,7 +65,7 @@ def verify(arguments: argparse.Namespace) -> int:
         if run.leftovers:
             listed = ", ".join(run.leftovers[:SHOWN])
             more = f", … {len(run.leftovers) - SHOWN} more" if run.leftovers[SHOWN:] else ""
-            say(f"no part of run {run.hash}: {listed}{more}")
+            say(f"not part of run {run.hash}: {listed}{more}")
         if run.unevaluated:
             say(f"run {run.hash}: its solutions were not evaluated: {run.unevaluated}")
     logs, problems = sum(r.logs for r in found), sum(len(r.problems) for r in found)

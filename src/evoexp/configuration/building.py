@@ -62,7 +62,7 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
     for group in (group for group in PLANNER_PARTS if plain.get(group) is not None):
         is_taken = f"${{{group}" in planner
         if group in plain["planner"] and not is_taken:
-            must = f"left as it is; set {group}, the group that it is taken from"
+            must = f"left as it is; set {group} itself"
             raise SettingError(f"planner.{group}", must, plain["planner"][group])
         if not is_taken:
             raise SettingError(group, "a part of the chosen planner", plain[group])
@@ -118,10 +118,10 @@ def _filled(value: Any, config: Mapping[str, Any], field: str, depth: int) -> An
     name = _WHOLE.fullmatch(value)
     if name is None:
         is_function = _FUNCTION.search(value)
-        reason = "no function, as oc.env is" if is_function else "it cannot be read"
+        reason = "functions such as oc.env are not allowed" if is_function else "it cannot be read"
         raise _refusal(field, reason, value)
     if depth == 0:
-        raise _refusal(field, "it leads round in a circle", value)
+        raise _refusal(field, "it leads back to itself", value)
     setting: Any = config
     for part in name[1].split("."):
         if isinstance(setting, list) and part.isdecimal() and int(part) < len(setting):

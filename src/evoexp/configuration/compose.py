@@ -37,7 +37,6 @@ from evoexp.configuration.overrides import (
     DELETE,
     NOT_IDENTITY,
     SCALARS,
-    SEARCHED,
     SWEEP,
     Choice,
     Override,
@@ -74,7 +73,7 @@ def expand(
         only: Labels to keep; empty keeps all.
     """
     given = syntax.collect(map(parse, overrides))
-    space = search_space(given)
+    space = syntax.search_space(given)
     rest = {key: each for key, each in given.items() if key not in space}
     syntax.refuse_sweeps(rest, multirun=multirun or bool(space))
     asked = rest.pop(EXPERIMENT, None)
@@ -83,18 +82,6 @@ def expand(
     if len({file and file.name for file in files}) < len(files):
         raise SettingError(EXPERIMENT, "names that differ", ",".join(map(str, names)))
     return [_expand_one(file, rest, only, space) for file in files]
-
-
-def search_space(overrides: Choice) -> Choice:
-    """Return the overrides that a search chooses values of; none without `sweep=…`."""
-    if SWEEP not in overrides or overrides[SWEEP].option() is None:
-        return {}
-    swept = {key: override for key, override in overrides.items() if override.is_swept}
-    space = {key: override for key, override in swept.items() if override.root in SEARCHED}
-    if not space:
-        must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
-        raise SettingError(SWEEP, must, " ".join(each.text for each in swept.values()))
-    return space
 
 
 def parse(text: str) -> Override:
@@ -264,7 +251,7 @@ def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Buil
 def _is_changed(
     compose: Composer, overrides: Choice, only: Sequence[str], built: Mapping[str, Built]
 ) -> bool:
-    """Whether the conditions differ from those that the experiment has by itself."""
+    """Whether the conditions differ from the experiment's own."""
     plain = {key: each for key, each in overrides.items() if key in NOT_IDENTITY}
     if compose.file is None or (len(plain) == len(overrides) and not only):
         return compose.file is None

@@ -94,7 +94,7 @@ Choice = Mapping[str, Override]  # by key, each with one value
 
 
 def collect(overrides: Iterable[Override]) -> dict[str, Override]:
-    """Return overrides by key, after refusing those that no configuration can take."""
+    """Return overrides by key, after refusing overrides that no configuration can take."""
     found: dict[str, Override] = {}
     for override in overrides:
         known = found.setdefault(override.key, override)
@@ -118,8 +118,8 @@ def _check_setting(override: Override) -> None:
     key, text, roots = override.key, override.text, [*groups(), *SCALARS]
     if override.root == "hydra":
         part = next(iter(re.findall(r"hydra[./](\w+)", key)), "")
-        instead = HYDRAS_OWN.get(part, "evoexp show experiment=NAME prints what there is")
-        must = f"a setting of evoexp (nothing of Hydra's own; {instead})"
+        instead = HYDRAS_OWN.get(part, "evoexp show experiment=NAME prints the settings")
+        must = f"a setting of evoexp (instead of Hydra's: {instead})"
         raise SettingError("override", must, text)
     if "/" in key:
         raise SettingError("override", "key=value", text)
@@ -145,11 +145,30 @@ def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
         if override.is_swept and not multirun:
             raise SettingError(key, "one value (or add -m to sweep over several)", override.typed)
         if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
-            must = "one value: a sweep is over what changes a condition"
+            must = "one value: only settings of a condition can be swept"
             raise SettingError(key, must, override.typed)
+    refuse_equal_values(overrides)
+
+
+def refuse_equal_values(overrides: Choice) -> None:
+    """Refuse overrides that are swept over one value twice."""
+    for key, override in overrides.items():
         texts = [value.text for value in override.values]
         if key != EXPERIMENT and len(set(texts)) < len(texts):
             raise SettingError(key, "values that differ", override.typed)
+
+
+def search_space(overrides: Choice) -> Choice:
+    """Return the overrides that a search chooses values of; none without `sweep=…`."""
+    if SWEEP not in overrides or overrides[SWEEP].option() is None:
+        return {}
+    swept = {key: override for key, override in overrides.items() if override.is_swept}
+    space = {key: override for key, override in swept.items() if override.root in SEARCHED}
+    if not space:
+        must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
+        raise SettingError(SWEEP, must, " ".join(each.text for each in swept.values()))
+    refuse_equal_values(space)
+    return space
 
 
 def single_values(override: Override) -> Iterator[Override]:
@@ -225,7 +244,7 @@ def assigned(config: dict[str, Any], overrides: Choice) -> dict[str, Any]:
         if isinstance(present, dict) and isinstance(value, dict):
             _merge(present, value)
         elif present is not None and override.prefix == ADD:
-            must = "given without +, it is there already"
+            must = "given without +: it exists already"
             raise SettingError(override.key, must, override.typed)
         elif isinstance(node, list) and last == len(node):
             node.append(value)
@@ -270,9 +289,9 @@ def _parts(key: str) -> list[tuple[int, str]]:
 def _delete(config: dict[str, Any], override: Override) -> None:
     node, last, present = _place(config, override)
     if isinstance(node, dict) and last not in node:
-        raise SettingError(override.key, "a setting that is there, to be deleted", override.text)
+        raise SettingError(override.key, "an existing setting, for ~ to delete", override.text)
     if override.values and override.values[0].data != present:
-        raise SettingError(override.key, f"{present!r}, to be deleted by ~", override.typed)
+        raise SettingError(override.key, f"{present!r}, for ~ to delete", override.typed)
     del node[last]
 
 
@@ -305,7 +324,7 @@ def _child(node: Any, override: Override, depth: int) -> Any:
         above = ".".join(parts[:depth])
         if isinstance(node, str) and node.startswith("${"):
             group = node[2:].rstrip("}")
-            must = f"given as {'.'.join([group, *parts[depth:]])}, the group that {above} is from"
+            must = f"given as {'.'.join([group, *parts[depth:]])}, the group of {above}"
             raise SettingError(override.key, must, override.typed)
         raise SettingError(field, f"left out: {above} is one value, {node!r}", override.typed)
     if depth == 0 and part not in node and not override.prefix:

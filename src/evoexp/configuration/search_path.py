@@ -1,7 +1,7 @@
 """The search path: the folders that options are read from, in order.
 
-First the folders given by `--config-dir`, then those of the variable `EVOEXP_CONFIG_DIR`, then
-those that installed packages declare as entry points of `evoexp.conf`, and last the shipped `conf`.
+First the folders given by `--config-dir`, then the folders in `EVOEXP_CONFIG_DIR`, then those
+that installed packages declare as entry points of `evoexp.conf`, and last the shipped `conf`.
 A folder has a sub-folder per group and in it a file per option: `ga/mine.yaml`. The first folder
 that has an option wins. An experiment may also be the path of a file that lies anywhere.
 

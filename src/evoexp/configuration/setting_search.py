@@ -178,7 +178,10 @@ class Search:
             self.study.sampler = self._sampler(number)
             trial = self.study.ask(distributions)
             try:
-                asked.append(Asked(*self._trial(number, trial.params), trial.number))
+                own, conditions = self._trial(number, trial.params)
+                for built in conditions.values():
+                    built.condition.prepare()  # refuses what does not go together
+                asked.append(Asked(own, conditions, trial.number))
             except EvoexpError as error:
                 own = Trial(number, self._texts(trial.params), ())
                 asked.append(Asked(own, {}, trial.number, str(error)))
@@ -228,8 +231,14 @@ class Search:
             if known.setdefault(built.condition.id, label) == label
         }
 
+    @property
+    def best_conditions(self) -> dict[str, Built]:
+        """The conditions of the problems and of the stored trial of the least score, by label."""
+        scores = [trial.value for trial in self._finished() if trial.value is not None]
+        return self.base | (self.stored[scores.index(min(scores))][1] if self.stored else {})
+
     def found(self) -> Searched:
-        """Return what is known so far."""
+        """Return the trials found so far, with the importance of settings."""
         first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
         found = self._searched((first, *(trial for trial, _ in self.stored)))
         refused = {

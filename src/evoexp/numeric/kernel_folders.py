@@ -129,7 +129,6 @@ class Checksums(event.Listener):
     """
 
     def __init__(self) -> None:
-        """Know no folder."""
         self._checked = set[Path]()
         self._writing: list[tuple[Path, Any]] = []  # folders, and the lock of each
 

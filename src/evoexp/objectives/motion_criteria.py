@@ -4,7 +4,7 @@ Rana & Zalzala 1995, Eqs. 2–7: short, even and free of collisions. Curkovic et
 C4 are those of Eqs. 6–8.
 """
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,6 @@ class StringFitness(Component):
 
     F = C_max − (k1 ΣC + k2 ΣC + k3 C5).
     """
-
-    component: ClassVar[str] = "string_fitness"
 
     length_weight: NonNegative  # k1 [1/deg]
     unevenness_weight: NonNegative  # k2 [1/deg]
@@ -79,19 +77,12 @@ def count_collisions(clearance: FloatArray, collisions: FloatArray) -> None:
 class MotionCriteria(Component):
     """Weights of C1 … C4; the paper adds them as they are."""
 
-    component: ClassVar[str] = "motion_criteria"
-
     # of C1, colliding configurations summed over all collaborators [-]
     collision_weight: NonNegative
     path_weight: NonNegative  # of C2, the end-effector's path [1/length unit]
     rotation_weight: NonNegative  # of C3, the sum of all links' turns [1/rad]
     # of C4, longest step of the end-effector less its shortest [1/length unit]
     evenness_weight: NonNegative
-
-    @property
-    def own_weights(self) -> tuple[float, float, float]:
-        """Weights of C2, C3, C4, as the kernel `measure_motions` takes them."""
-        return self.path_weight, self.rotation_weight, self.evenness_weight
 
 
 @kernel

@@ -5,10 +5,10 @@ of θ3 that bring the end-effector to its height, and the platform stands where 
 the target.
 """
 
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import borrowed, inlined, kernel
@@ -193,8 +193,6 @@ class Avoidance(Settings):
 class PlacementCriteria(Component):
     """Weights of E of Eq. 14, which is at most `greatest`, the cost of an infeasible posture."""
 
-    component: ClassVar[str] = "placement_criteria"
-
     torque_norm_weight: NonNegative  # ε, of ‖τ‖² (Eq. 10)
     torque_max_weight: NonNegative  # λ, of the greatest |α τ| (Eq. 11)
     manipulability_weight: NonNegative  # δ, of 1 / det(J Jᵀ) (Eq. 13)
@@ -204,8 +202,7 @@ class PlacementCriteria(Component):
     greatest: Positive
     avoidances: tuple[Avoidance, ...] = ()  # terms of Eq. 12
 
-    @model_validator(mode="after")
-    def _something_is_asked_for(self) -> Self:
+    def _check(self) -> None:
         weights = self.torque_norm_weight, self.torque_max_weight, self.manipulability_weight
         counts = any((*weights, *(one.weight for one in self.avoidances)))
         must = "above 0, or another weight: with all of them 0 every posture costs the same"
@@ -213,7 +210,6 @@ class PlacementCriteria(Component):
         if self.torque_max_weight > 0.0 and not any(self.torque_weights):
             must = "above 0 for one torque at least"
             raise SettingError("torque_weights", must, list(self.torque_weights))
-        return self
 
     @property
     def weights(self) -> Weights:

@@ -18,12 +18,11 @@ cost is the sum of weight × term. Terms and their units:
 - `free_space` [-]: missing clearance up to `reach`, in units of `reach`; 0 beyond, 1 in contact.
 """
 
-from typing import ClassVar, Literal, NamedTuple, Self
+from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE, acos, asin
 from evoexp.records import FloatArray
@@ -87,8 +86,6 @@ class FreeSpace(RatioTerm):
 class PostureCost(Component):
     """Terms and weights; see the module's first lines."""
 
-    component: ClassVar[str] = "posture_cost"
-
     goal_distance: LengthTerm | None = None
     goal_angle: AngleTerm | None = None
     axial_approach: AngleTerm | None = None
@@ -102,8 +99,7 @@ class PostureCost(Component):
     # times its weight
     grasp_angles: Literal["sum", "larger"] = "sum"
 
-    @model_validator(mode="after")
-    def _terms_agree(self) -> Self:
+    def _check(self) -> None:
         must = "given: every goal is a place"
         self.demand("goal_distance", self.goal_distance is not None, must)
         if self.upright is not None and self.keep_parallel is not None:
@@ -112,7 +108,6 @@ class PostureCost(Component):
         if self.free_space is not None and self.collision is None:
             must = "given with collision, whose distances it rates"
             raise SettingError("free_space", must, self.free_space.weight)
-        return self
 
     @property
     def chosen(self) -> tuple[str, ...]:
@@ -133,9 +128,8 @@ class PostureCost(Component):
             if name not in TERMS:
                 must = f"a cost term ({', '.join(TERMS)})"
                 raise SettingError(f"{field}[{k}]", must, name, nearest(name, TERMS))
-            if name not in self.chosen:
-                must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
-                raise SettingError(f"{field}[{k}]", must, name)
+            must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
+            demand(name in self.chosen, f"{field}[{k}]", must, name)
         counting = terms or self.chosen
         given = [getattr(self, name) if name in counting else None for name in TERMS]
         weights = [term.weight if term else 0.0 for term in given]

@@ -1,4 +1,4 @@
-"""Arms as chains of links, and their motions as trails of postures, in the plane or in space.
+"""Arms as chains of links, their motions as trails of postures, and solids, in plane or space.
 
 Links are rows with x, y, x_end, y_end (in space z, z_end, too), in order from the base on. `names`
 are the axes that are drawn: "xy" or "xyz".
@@ -8,14 +8,17 @@ from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
 
+import coal
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from evoexp.playback.recording import outline
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, motion_scenes, style
+from evoexp.report.figures import groups, motion_scenes, records, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.scenarios.obstacles import obstacle_table
@@ -23,6 +26,9 @@ from evoexp.scenarios.obstacles import obstacle_table
 DASHES: Any = (0, (2, 1))
 WAY: dict[str, Any] = {"linestyle": ":", "linewidth": 0.9}
 WIDE, THIN = 2.4, 0.9  # [pt] of the last posture, and of those before
+SIZES = ["size_1", "size_2", "size_3"]  # box: half its edges; else radius and half the length
+TURN = [f"r{row}{column}" for row in range(1, 4) for column in range(1, 4)]
+COLUMNS = ["shape", "x", "y", "z", *TURN, *SIZES]  # of solids
 
 
 def draw_chain(
@@ -84,7 +90,7 @@ def trail_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
         *arm_keys(arms, name),
         style.key("first posture", color=grey, linewidth=1.4, linestyle=DASHES),
         style.key("last posture", color=grey, linewidth=WIDE, marker="o", mfc="white", ms=4),
-        style.key("way of the tip", color=grey, **WAY),
+        style.key("path of the tip", color=grey, **WAY),
     ]
 
 
@@ -130,3 +136,51 @@ def space(
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
     look: dict[str, Any] = {"view": (22.0, -55.0), "ticks": (2, 3)}
     return motion_scenes.space(figure, place, low, high, pad, unit, zoom=zoom, **look)
+
+
+def solid(shape: Any, placement: Any) -> dict[str, Any]:
+    """Return the `COLUMNS` of a coal shape and its placement (`pin.SE3`).
+
+    A mesh, or another shape without a row of its own, is the box around it. A half-space has no
+    row: empty.
+    """
+    where, turn = np.array(placement.translation), np.array(placement.rotation)
+    if isinstance(shape, coal.Halfspace | coal.Plane):
+        return {}
+    if isinstance(shape, coal.Sphere | coal.Capsule | coal.Cylinder | coal.Box):
+        drawn, _ = outline(shape)
+        name, size = drawn.kind, np.array([*drawn.size, 0.0, 0.0][:3])
+        size *= 0.5 if name == "box" else (1.0, 0.5, 0.0)
+    else:
+        shape.computeLocalAABB()
+        box = shape.aabb_local
+        name, size, where = "box", 0.5 * (box.max_ - box.min_), where + turn @ box.center()
+    return dict(zip(COLUMNS, (name, *where, *turn.ravel(), *size), strict=True))
+
+
+def triangles(row: Any) -> FloatArray:
+    """Return the surface of a row of `COLUMNS` in space, (triangles, 3, 3)."""
+    turn, size, place = (
+        np.array([getattr(row, name) for name in names], dtype=np.float64)
+        for names in (TURN, SIZES, "xyz")
+    )
+    whole = 2.0 * size if row.shape == "box" else size * (1.0, 2.0, 0.0)  # halves in the table
+    return motion_scenes.triangles_of(row.shape, whole, None) @ turn.reshape(3, 3).T + place
+
+
+def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
+    """Draw a row of `COLUMNS` in axes in space, or as seen along z in plane ones."""
+    faces = triangles(row)
+    if not hasattr(axes, "zaxis"):
+        seen = motion_scenes.outline_from_above(faces)
+        axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
+        return
+    shades = motion_scenes.shaded(faces, colour, alpha)
+    surface = Poly3DCollection(faces, facecolors=shades, linewidth=0, zorder=1)
+    surface.set_rasterized(True)  # hundreds of triangles
+    axes.add_collection3d(surface)
+
+
+def corners(table: pd.DataFrame) -> FloatArray:
+    """Return the corners (points, 3) of the surfaces of all solids of a table."""
+    return np.vstack([np.empty((0, 3)), *(triangles(row).reshape(-1, 3) for row in records(table))])

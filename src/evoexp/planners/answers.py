@@ -3,7 +3,7 @@
 `Proofs` serves searches that accept only what the exact certifier proves.
 
 A motion that never leaves the start touches nothing and is certified; only its departures tell that
-it does not do what was asked for.
+it does not solve the task.
 """
 
 import math
@@ -25,9 +25,9 @@ KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave 
 Acceptance = Literal["model", "certified", "margin"]
 """Motions that a search accepts.
 
-`model`: those that its collision model accepts at the instants it tests; `certified`: those of them
-that the exact certifier proves free of contact between all instants; `margin`: or by the task's
-margins.
+`model`: its collision model accepts the motion at the instants it tests; `certified`: the exact
+certifier also proves the motion free of contact between all instants; `margin`: the proof includes
+the task's margins.
 """
 
 
@@ -36,7 +36,7 @@ class JudgementArrays(NamedTuple):
 
     cost: FloatArray  # (individuals,) lower is better; inf: infeasible
     feasible: BoolArray  # (individuals,) whether the planner's own model accepts each
-    collision_queries: int  # configurations asked for, also those that the kernels skip
+    collision_queries: int  # configurations queried, those skipped by kernels included
     terms: Mapping[str, NDArray[Any]]  # name → (individuals,) of the planner's own terms
 
     def named_terms(self, individual: int) -> dict[str, float]:
@@ -61,7 +61,7 @@ class Listing(NamedTuple):
 
 
 def num_body_tests(problem: Any) -> float:
-    """Return how many pairs of shapes one query of a problem's model is; NaN: not known."""
+    """Return how many pairs of shapes one query of a problem's model compares; NaN: unknown."""
     return float(getattr(getattr(problem, "collision", None), "num_tests", math.nan))
 
 
@@ -87,7 +87,7 @@ def in_shape(solution: FloatArray, *shape: int) -> FloatArray:
 
 
 def of_place(name: str, given: FloatArray, wanted: FloatArray, unit: str) -> list[str]:
-    """Return a phrase if a configuration or place is another one than the task's, of any shape.
+    """Return a phrase if a configuration or place, of any shape, differs from the task's.
 
     The name is one as in "the start of arm 1".
     """
@@ -164,7 +164,7 @@ class Proofs:
     def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
         """Judge individuals, the cheapest first, until one is proven; return it, None if none is.
 
-        In `costs` (individuals,) refuted ones cost inf then.
+        In `costs` (individuals,) refuted individuals then cost inf.
         """
         while np.isfinite(costs[k := int(np.argmin(costs))]):
             if self.is_proven(solution(k)):

@@ -1,6 +1,6 @@
 """Motions of arms between two configurations: start and goal in degrees, bodies, covers.
 
-And tasks that MoveIt wrote, in the words of planners: joints by name, pairs that may touch.
+Tasks from MoveIt get the same form: joints by name, pairs that may touch.
 """
 
 import re
@@ -250,7 +250,7 @@ def _hull_depth(bodies: Scene, placements: Any, one: int, two: int) -> float:
 
 
 def links_of_bodies(assembly: Assembly) -> dict[str, str]:
-    """Return the link of each body: its own name, or without a number that tells bodies apart."""
+    """Return the link of each body: its name, without the number that tells bodies apart."""
     names = [str(item.name) for item in assembly.geometry.geometryObjects]
     frames = assembly.frames
     links = set() if frames is None else {*dict(frames.standing), *frames.moving}
@@ -258,7 +258,7 @@ def links_of_bodies(assembly: Assembly) -> dict[str, str]:
 
 
 def with_allowed_pairs(assembly: Assembly, task: MoveitTask) -> Assembly:
-    """Return a robot with the pairs that may touch: the task's matrix has the last word."""
+    """Return a robot with the pairs that may touch: the task's matrix decides."""
     allowed, disabled = task.allowed, set(assembly.disabled)
     for (one, link), (two, other) in combinations(links_of_bodies(assembly).items(), 2):
         may_touch = allowed.may_touch(link, other)
@@ -344,11 +344,11 @@ def touching(assembly: Assembly, task: MoveitTask) -> tuple[tuple[int, int], ...
 
 
 def hull_notes(names: Sequence[str]) -> tuple[str, ...]:
-    """Say that a search takes obstacles to be larger than they are, if there are such."""
+    """Note which obstacles a search takes to be larger than they are."""
     if not names:
         return ()
-    note = "meshes, cones and hulls: the search tests the boxes around them, the verdict is of the"
-    return (f"{note} convex hulls: {', '.join(names)}",)
+    note = "meshes, cones and hulls: the search tests boxes around them, the verdict"
+    return (f"{note} judges their convex hulls: {', '.join(names)}",)
 
 
 def _typed(assembly: Assembly, q: FloatArray) -> FloatArray:

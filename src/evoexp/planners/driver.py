@@ -61,20 +61,12 @@ class TableSearch(ABC):
         _, means, deviations, num_feasible = self.summaries[places].T.tolist()
         ends, steps = last == self._ga.num_generations, range(1, len(places) + 1)
         evaluations, queries = self.counts(first)
-        block = Block(
-            keeper.index + 1,
-            bests,
-            self.lowest(places).tolist(),
-            means,
-            deviations,
-            [*map(int, num_feasible)],
-            [keeper.evaluations + evaluations * k for k in steps],
-            [keeper.collision_queries + queries * k for k in steps],
-            self.costs[places],
-            lambda k: self.population(first + k),
-            self.states,
-            self.criteria(places.item(-1)) if ends else None,
-        )
+        columns = self.lowest(places).tolist(), means, deviations, [*map(int, num_feasible)]
+        spent = [keeper.evaluations + evaluations * k for k in steps]
+        asked = [keeper.collision_queries + queries * k for k in steps]
+        shown = self.costs[places], lambda k: self.population(first + k), self.states
+        front = self.criteria(places.item(-1)) if ends else None
+        block = Block(keeper.index + 1, bests, *columns, spent, asked, *shown, front)
         keeper.index, keeper.evaluations = keeper.index + len(places), block.evaluations[-1]
         keeper.collision_queries = block.collision_queries[-1]
         return block
@@ -136,7 +128,6 @@ class GeneticSearch(TableSearch):
         genome: operator.Genome,  # of every individual
         per_call: int,  # generations computed per call, at most
     ) -> None:
-        """Begin a run."""
         # normal deviates take no fixed number of uniform ones: generations are drawn one by one
         takes_normals, count = operators.mutation.takes_normals, ga.num_offspring
         super().__init__(ga, 1 if takes_normals else per_call)

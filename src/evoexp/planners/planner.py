@@ -1,8 +1,8 @@
 """A planner's obligations, its usual answers, and the one keeper of the best solution so far.
 
 A planner is a component whose fields are its settings. It never logs, draws, sleeps, reads the
-clock or a file; its randomness is an argument. `Planner` names what every planner writes itself,
-`PlannerDefaults` answers what most answer alike. `evoexp.testing` checks every obligation.
+clock or a file; its randomness is an argument. `Planner` lists the members that every planner
+writes, `PlannerDefaults` has the answers of most planners. `evoexp.testing` checks all obligations.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.scene import Part
-from evoexp.evolution.succession import CostStatistics, cost_statistics
+from evoexp.evolution.succession import cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.answers import JudgementArrays as JudgementArrays
@@ -48,7 +48,7 @@ class Planner(Protocol):
         """Yield the initial population, then all generations, one or several per `Block`."""
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw `count` individuals as the initial population is drawn, individuals last.
+        """Draw `count` individuals as the initial population is drawn; they are the last axis.
 
         Raises:
             SettingError: If the planner has several populations, one after the other.
@@ -99,7 +99,7 @@ class PlannerDefaults:
 
     @property
     def answers_are_proven(self) -> bool:
-        """Whether what the search accepts is proven: by its field `acceptance`, if it has one."""
+        """Whether the search accepts proven answers only: see its field `acceptance`, if any."""
         return getattr(self, "acceptance", "model") != "model"
 
     @property
@@ -142,31 +142,31 @@ class PlannerDefaults:
     def cost_of_terms(self, terms: Mapping[str, float]) -> float:
         """Return the recorded cost of a solution, given its terms as `evaluate` names them.
 
-        NaN: they do not tell it. `verify` compares it with the stored cost where that is finite.
+        NaN if they do not determine it. `verify` compares it with a finite stored cost.
         """
         return terms.get("cost", math.nan)
 
     def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
-        """Return the ways in which a solution is none of the task, each in a phrase.
+        """Return the reasons why a solution does not solve the task, each in a phrase.
 
-        Another start or goal, a joint beyond its limits, a forbidden move; nothing about
-        collisions, which `parts` are judged for, nor about a goal that a search comes near to.
+        For example another start, a joint beyond its limits or a forbidden move. Collisions do not
+        belong here (`parts` are judged for them), nor a goal that a search only comes near to.
         """
         return ()
 
     def memory(self, problem: Any) -> int:
         """Return an estimate of the memory that a run takes beyond that of its problem [B].
 
-        It need not be exact, yet grow as the memory does with populations, paths and generations:
-        a run that would take more than there is is refused before it begins.
+        It need not be exact, but must grow with populations, paths and generations as the memory
+        does: a run that needs more memory than there is does not start.
         """
         individuals = max(self.num_evaluations(0), self.num_evaluations(1))
         return 8 * COPIES * num_values(self.shape(problem)) * individuals
 
     def prior_queries(self, problem: Any) -> int:
-        """Return how many configurations the task itself says to be free or not, as a map does.
+        """Return the number of configurations that the task itself, as a map, calls free or not.
 
-        Comparisons add them to the queries of a run: another planner asks for them one by one.
+        Comparisons add them to the queries of a run: another planner must query them one by one.
         """
         return 0
 
@@ -216,7 +216,7 @@ class Keeper:
         self.evaluations = self.collision_queries = 0  # so far
 
     def improves(self, cost: float) -> bool:
-        """Return whether a cost is to be kept: a lower one, or the first of all."""
+        """Return whether to keep a cost: it is lower than the best, or the first."""
         return cost < self.cost or self.index < 0
 
     def keep(self, cost: float, best: Candidate) -> None:
@@ -254,8 +254,7 @@ class Keeper:
         judgement: JudgementArrays,  # of this population
     ) -> Block:
         """Keep the best individual of a generation if it improves, and return a block of it."""
-        statistics, feasible = cost_statistics(judgement.cost), judgement.feasible
-        k = statistics.best
+        feasible, k = judgement.feasible, cost_statistics(judgement.cost).best
         lowest = float(judgement.cost[k])
 
         def candidate(k: int, solved: bool) -> Candidate:
@@ -266,54 +265,32 @@ class Keeper:
             self.keep_proven(judgement.cost, feasible, candidate)
         elif self.improves(lowest):
             self.keep(lowest, candidate(k, bool(feasible[k])))
-        return self.record(
-            statistics,
-            judgement.cost,
-            population,
-            lowest=lowest,
-            num_feasible=int(np.count_nonzero(feasible)),
-            evaluations=len(judgement.cost),
-            collision_queries=judgement.collision_queries,
-        )
+        num_feasible, queries = int(np.count_nonzero(feasible)), judgement.collision_queries
+        return self.record(judgement.cost, population, queries, num_feasible=num_feasible)
 
     def record(
         self,
-        statistics: CostStatistics,  # mean and deviation of its costs
-        costs: FloatArray,  # (individuals,); see `Generation`
+        judged: FloatArray,  # (individuals,) costs
         population: NDArray[Any],  # any shape
-        *,
-        lowest: float,  # its lowest cost; where the best is a team, the lowest of a team
-        num_feasible: int,  # individuals that the planner's own model accepts
-        evaluations: int,  # of this generation
         collision_queries: int,  # configurations that this generation asked for
-        # see `Generation`
-        criteria: FloatArray | None = None,
-        stop_reason: str = "",
-        arrays: Mapping[str, NDArray[Any]] | None = None,
+        *,
+        num_feasible: int | None = None,  # for the planner's own model; None: all of a finite cost
+        evaluations: int | None = None,  # of this generation; None: one per individual
+        **differing: Any,  # fields of the block that do not follow from the above
     ) -> Block:
         """Count a generation and return a block of it."""
+        best, mean, deviation = cost_statistics(judged)
+        feasible = int(np.isfinite(judged).sum()) if num_feasible is None else num_feasible
         self.index += 1
-        self.evaluations += evaluations
+        self.evaluations += len(judged) if evaluations is None else evaluations
         self.collision_queries += collision_queries
-        return Block(  # by position: half the time
-            self.index,
-            [self.standing],
-            [lowest],
-            [statistics.mean],
-            [statistics.std],
-            [num_feasible],
-            [self.evaluations],
-            [self.collision_queries],
-            costs[None],
-            lambda place: population,
-            None,
-            criteria,
-            stop_reason,
-            arrays,
-        )
+        columns = [judged.item(best)], [mean], [deviation], [feasible], [self.evaluations]
+        totals, shown = [self.collision_queries], (judged[None], lambda place: population)
+        block = Block(self.index, [self.standing], *columns, totals, *shown)
+        return block._replace(**differing) if differing else block
 
 
-class WrappedPlanner(PlannerDefaults, Component):
+class WrappedPlanner(PlannerDefaults, Component, is_base=True):
     """Answers as the wrapped planner does; controls write `populations`, references `evolve`."""
 
     planner: Any  # the planner that it stands beside; `Condition` checks that it is one

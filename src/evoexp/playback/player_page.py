@@ -17,11 +17,7 @@ from evoexp.records import FloatArray
 
 DIGITS = 6  # significant, of distances
 MARGIN = {True: "kept", False: "not kept", None: "undecided"}
-FILES = {
-    "style": "motion_page.css",
-    "geometry": "motion_geometry.js",
-    "script": "motion_page.js",
-}
+FILES = {"style": "motion_page.css", "geometry": "motion_geometry.js", "script": "motion_page.js"}
 
 
 def page(recordings: Sequence[Recording]) -> bytes:

@@ -136,7 +136,7 @@ def as_ros(found: Trajectory) -> bytes:
     """Return a trajectory as a `trajectory_msgs/msg/JointTrajectory` in JSON, a part of YAML."""
     others = sorted(set(found.units) - {"rad", "m"})
     if others:
-        raise BadTiming(f"--format ros: joints that slide must do so in m, was {others[0]}")
+        raise BadTiming(f"--format ros: sliding joints must be in m, was {others[0]}")
     nanoseconds = np.rint(found.times * 1e9).astype(np.int64)
     rates = [[]] * len(found.times) if found.velocities is None else found.velocities.tolist()
     points = [

@@ -1,4 +1,4 @@
-"""Joint trajectories out of files: those that `export` writes, and those of others.
+"""Joint trajectories out of files, written by `export` or by others.
 
 CSV with a column per joint (`elbow_rad`, `elbow [deg]`, `elbow`), or a
 `trajectory_msgs/msg/JointTrajectory` in JSON or YAML. Joints are matched by name, in any order; a
@@ -60,7 +60,7 @@ def read_columns(content: bytes) -> JointTrajectory:
     head = rows[0].cells if rows else []
     for name in head:
         if head.count(name) > 1 or not name or NUMBER.fullmatch(name):
-            raise TableError(rows[0].line, "a head with a name per column, each once", name)
+            raise TableError(rows[0].line, "a header with a different name per column", name)
     for line, cells in rows[1:]:
         for name, cell in zip(head, cells, strict=True):
             if not NUMBER.fullmatch(cell):

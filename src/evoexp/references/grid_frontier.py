@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.numeric.compilation import kernel
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray, IntArray
@@ -63,7 +63,7 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
     """Return the permitted moves by their ends; see `best_walk`."""
     order = np.argsort(network.heads, kind="stable")
     heads, count = network.heads[order], len(network.unsafeness)
-    # place of each move among those that end at the same node
+    # place of each move among the moves that end at the same node
     rank = np.arange(len(heads)) - np.searchsorted(heads, heads)
     moves = int(rank.max()) + 1
     tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)
@@ -122,7 +122,6 @@ def known_maps() -> dict[str, Known]:
 class GridFrontier(Reference):
     """The best path known, and the bound below all paths."""
 
-    component: ClassVar[str] = "grid_frontier"
     revision: ClassVar[int] = 4
 
     planner: GridPathGa  # the path search whose grid and cost it shares
@@ -306,9 +305,8 @@ def best_walk(
         if count % BLOCK and bounds[count] < least:
             costs[count] = costs_at(count, count)[count]
             least = min(least, costs[count])
-    if not np.isfinite(costs.min()):
-        must = "as many as a path from start to goal has"
-        raise SettingError("reference.max_nodes", must, max_nodes)
+    must = "at least the number of nodes from start to goal"
+    demand(np.isfinite(costs.min()), "reference.max_nodes", must, max_nodes)
     best = int(costs.argmin())
     _, walk = best_walks(arrivals, lam / best * arrivals.unsafeness, best)
     numbers = np.flatnonzero(np.isfinite(costs))

@@ -136,7 +136,6 @@ class Programme:
     """Minimise smooth(x) + λ t, t above all |α τ|, height 0, no margin negative; no t if λ is 0."""
 
     def __init__(self, model: Directions) -> None:
-        """Take the criteria."""
         self._model, self._bounds = model, model.bounds()
         self.minimax = bool(model.weights[1])
         self._where = b""

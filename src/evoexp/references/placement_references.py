@@ -47,7 +47,6 @@ class PlacementOptimum(Reference):
     Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first.
     """
 
-    component: ClassVar[str] = "placement_optimum"
     revision: ClassVar[int] = 2  # 2: saddles on kinks of E are no minima
 
     # values of either angle that the dense search takes
@@ -172,8 +171,6 @@ class PlacementLandscape(Reference):
     where infeasible.
     """
 
-    component: ClassVar[str] = "placement_landscape"
-
     # values of either angle, both ends of their range included
     num_angles: Annotated[int, Field(ge=2, le=10_000)]
 
@@ -212,7 +209,6 @@ class PlacementConventional(Reference):
     are not counted.
     """
 
-    component: ClassVar[str] = "placement_conventional"
     revision: ClassVar[int] = 2  # 2: exact slopes, so fewer evaluations
 
     num_starts: LayoutCount  # number of starts

@@ -12,7 +12,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.succession import CostStatistics
 from evoexp.planners.planner import Candidate, Keeper, Reproducibility, WrappedPlanner
 from evoexp.records import Block, FloatArray
 
@@ -32,7 +31,7 @@ class Truth(NamedTuple):
     arrays: Mapping[str, np.ndarray] = {}
 
 
-class Reference(WrappedPlanner):
+class Reference(WrappedPlanner, is_base=True):
     """Base of every reference; a subclass writes `truth`."""
 
     reproducibility: ClassVar[Reproducibility] = "environment"
@@ -54,15 +53,12 @@ class Reference(WrappedPlanner):
         cost = float(found.cost)
         terms = {name: float(value) for name, value in found.terms.items()}
         keeper.keep(cost, Candidate(found.best, terms, found.solved))
-        is_finite = bool(np.isfinite(cost))
         yield keeper.record(
-            CostStatistics(0, cost if is_finite else np.nan, 0.0 if is_finite else np.nan),
             np.array([cost]),
             found.best[None, :],
-            lowest=cost,
+            0,
             num_feasible=int(found.solved),
             evaluations=found.evaluations,
-            collision_queries=0,
             arrays=dict(found.arrays),
         )
 

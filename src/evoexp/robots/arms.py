@@ -1,11 +1,11 @@
 """Arms given by numbers: planar ones, joint by joint, by a table; and several as one robot."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal
 
 import coal
 import numpy as np
 import pinocchio as pin
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.attachments import File
 from evoexp.errors import SettingError, demand
@@ -31,8 +31,6 @@ Point2 = tuple[float, float]
 class PlanarChain(Chain):
     """Revolute joints about z in the x–y plane; a joint angle is relative to the link before."""
 
-    component: ClassVar[str] = "planar_chain"
-
     # lengths from joint to joint, the last to the tip [length unit of the scene]
     link_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
     base_position: Point2  # the first joint (x, y)
@@ -42,13 +40,11 @@ class PlanarChain(Chain):
     # least and greatest angle of every joint [rad], as the papers print them; None: any angle
     joint_limits: tuple[Limits, ...] | None = None
 
-    @model_validator(mode="after")
-    def _limits_fit(self) -> Self:
+    def _check(self) -> None:
         limits = self.joint_limits
         if limits is not None and len(limits) != len(self.link_lengths):
             must = f"one pair per link ({len(self.link_lengths)})"
             raise SettingError("joint_limits", must, len(limits))
-        return self
 
     def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add one revolute joint per link; a tool is a link of no length on the last joint."""
@@ -78,10 +74,8 @@ class SerialJoint(Settings):
     offset: Point3
     kind: Literal["revolute", "prismatic"] = "revolute"  # whether it turns or slides
 
-    @model_validator(mode="after")
-    def _points_somewhere(self) -> Self:
+    def _check(self) -> None:
         demand(any(self.axis), "axis", "a direction, not (0, 0, 0)", list(self.axis))
-        return self
 
     def model(self) -> Any:
         """Return Pinocchio's joint model."""
@@ -97,8 +91,6 @@ class SerialChain(Chain):
     stand in the same place have none between them. The segment from the base to the first joint is
     a link that does not move.
     """
-
-    component: ClassVar[str] = "serial_chain"
 
     joints: Annotated[tuple[SerialJoint, ...], Field(min_length=1)]  # from the base to the tip
     tip: Point3  # from the last joint [length unit of the scene]
@@ -168,8 +160,7 @@ def body_geometry(body: AnyBody, field: str) -> tuple[Any, Any]:
         return shape, pin.SE3(np.eye(3), np.array(body.center))
     start, end = np.array(body.start), np.array(body.end)
     reach = length(end - start)
-    if reach == 0.0:
-        raise SettingError(f"{field}.end", "another point than start", list(body.end))
+    demand(reach != 0.0, f"{field}.end", "another point than start", list(body.end))
     kind = coal.Capsule if body.shape == "capsule" else coal.Cylinder
     return kind(body.radius, reach), along(start, end)
 
@@ -202,8 +193,6 @@ class DhChain(Chain):
     body of joint 0 in the base's).
     """
 
-    component: ClassVar[str] = "dh_chain"
-
     # rows of the table, from the base to the last joint
     joints: Annotated[tuple[DhJoint, ...], Field(min_length=1)]
     bodies: Annotated[tuple[AnyBody, ...], Field(min_length=1)]  # what can collide
@@ -213,15 +202,13 @@ class DhChain(Chain):
     # its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across it
     tool_rotation: Point3 = (0.0, 0.0, 0.0)
 
-    @model_validator(mode="after")
-    def _bodies_fit(self) -> Self:
+    def _check(self) -> None:
         names = [body.name for body in self.bodies]
         for k, body in enumerate(self.bodies):
             if body.joint > len(self.joints):
                 raise SettingError(f"bodies[{k}].joint", f"at most {len(self.joints)}", body.joint)
             if body.name in names[:k]:
                 raise SettingError(f"bodies[{k}].name", "a name that no other body has", body.name)
-        return self
 
     def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add the joints; a link is the line from one joint to the next, the last to the tool."""
@@ -254,8 +241,6 @@ class DhChain(Chain):
 
 class Arms(Robot):
     """Arms standing in one scene; q is their configurations one after the other."""
-
-    component: ClassVar[str] = "arms"
 
     arms: Annotated[tuple[Chain, ...], Field(min_length=1)]  # the arms, each with its own base
     # pairs of bodies that need no test, derived when the files of arms out of a URDF are

@@ -119,7 +119,7 @@ AppendArm = Callable[[Any, int], ArmParts]
 """Adds the joints of the arm of a number to a `pin.Model`; returns what comes with them."""
 
 
-class Robot(Component):
+class Robot(Component, is_base=True):
     """Base of every robot description: names its arms, which are built together."""
 
     def chains(self) -> tuple[AppendArm, ...]:
@@ -135,7 +135,7 @@ class Robot(Component):
         return assembled(self.chains())
 
 
-class Chain(Robot):
+class Chain(Robot, is_base=True):
     """Base of a single arm, which can stand as a robot of its own."""
 
     def append_to(self, model: Any, arm: int) -> ArmParts:

@@ -68,8 +68,7 @@ def whole_mesh(content: bytes, name: str, field: str) -> bytes:
     several = ending == ".dae" and len(DAE_PARTS.findall(content)) > 2
     if not reason and several and unused_vertices(load(content, name, field)):
         reason = "parts whose triangles coal joins to other vertices (save it as one mesh, an STL)"
-    if reason:
-        raise SettingError(field, "a URDF whose meshes can be read", f"'{name}': {reason}")
+    demand(not reason, field, "a URDF whose meshes can be read", f"'{name}': {reason}")
     return content
 
 
@@ -101,8 +100,7 @@ def mesh_shape(
 def load(content: bytes, name: str, field: str, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Any:
     """Load a mesh by coal, as a model of triangles; the ending of its name tells the format."""
     ending = Path(name).suffix.lower()
-    if ending not in MESHES:
-        raise SettingError(field, f"of meshes that end in {', '.join(MESHES)}", name)
+    demand(ending in MESHES, field, f"of meshes that end in {', '.join(MESHES)}", name)
     with tempfile.TemporaryDirectory() as directory:
         place = Path(directory) / f"mesh{ending}"
         place.write_bytes(content)

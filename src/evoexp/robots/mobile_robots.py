@@ -1,11 +1,10 @@
 """Platforms that move, with and without an arm of three links (Chen & Zalzala 1995)."""
 
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal
 
 import coal
 import numpy as np
 import pinocchio as pin
-from pydantic import model_validator
 
 from evoexp.errors import demand
 from evoexp.records import FloatArray
@@ -17,8 +16,6 @@ ARM_JOINTS = 3
 
 class FloorPlatform(Chain):
     """An upright cylinder on prismatic joints along x and y, or along x, y and z."""
-
-    component: ClassVar[str] = "floor_platform"
 
     body_radius: Positive  # of the cylinder [length unit of the scene]
     # of the cylinder, which stands on the floor z = 0; in three dimensions it is centred on
@@ -46,8 +43,6 @@ class MobileArm(Chain):
     moves along (y = 0). Every joint angle is relative to the link before.
     """
 
-    component: ClassVar[str] = "mobile_arm"
-
     link_lengths: tuple[Positive, Positive, Positive]  # l1, l2, l3 [length unit of the scene]
     # length and height of the platform, a rectangle with round ends [length unit]
     platform_size: tuple[Positive, Positive]
@@ -57,12 +52,10 @@ class MobileArm(Chain):
     # least and greatest τ1, τ2, τ3; None: any torque (Eq. 9)
     torque_limits: tuple[Limits, Limits, Limits] | None = None
 
-    @model_validator(mode="after")
-    def _is_longer_than_high(self) -> Self:
+    def _check(self) -> None:
         length, height = self.platform_size
         must = "[length, height] with length > height"
         demand(length > height, "platform_size", must, [length, height])
-        return self
 
     @property
     def limits(self) -> FloatArray:
@@ -95,8 +88,6 @@ class FloorManipulator(Chain):
     Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's
     first joint stands in the middle of its top.
     """
-
-    component: ClassVar[str] = "floor_manipulator"
 
     body_radius: Positive  # of the platform [length unit of the scene]
     body_height: Positive  # of the platform

@@ -171,7 +171,7 @@ def _shapes(robot: "Urdf", body: UrdfBody) -> list[Any]:
         shapes = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
         return [shapes.get(body.kind, coal.Capsule)(*body.sizes)]
     names = [mesh.name for mesh in robot.meshes]
-    must = "those that the URDF names"
+    must = "the meshes that the URDF names"
     demand(body.mesh in names, "robot.meshes", must, f"without '{body.mesh}'")
     k, is_hull = names.index(body.mesh), body.kind == "convex"
     content, pieces = robot.meshes[k].file.content, robot.meshes[k].pieces

@@ -114,8 +114,7 @@ def parsed_xml(content: bytes, field: str) -> Any:
         root = builder.close()
     except (expat.ExpatError, ValueError, LookupError) as error:
         raise SettingError(field, must, str(error)) from None
-    if root.tag != "robot":
-        raise SettingError(field, must, f"<{root.tag}>")
+    demand(root.tag == "robot", field, must, f"<{root.tag}>")
     return root
 
 
@@ -132,8 +131,7 @@ def read_urdf(content: bytes, field: str) -> UrdfFile:
     """Read the links, collision bodies and joints of a URDF."""
     root = parsed_xml(content, field)
     for element in root.iter():
-        if element.tag.startswith("xacro:"):
-            raise SettingError(field, XACRO, f"<{element.tag}>")
+        demand(not element.tag.startswith("xacro:"), field, XACRO, f"<{element.tag}>")
     _Check(field).element(root, "")
     for what, path in {"links": "link", "collision bodies": "link/collision"}.items():
         if (count := len(root.findall(path))) > MOST_LINKS:
@@ -203,7 +201,7 @@ def _joint(joint: Any, field: str) -> UrdfJoint:
     axis, limit, rule = (joint.find(part) for part in ("axis", "limit", "mimic"))
     direction = _numbers(axis, "xyz", "1 0 0")
     if kind != "floating" and not sum(map(abs, direction)) > SHORTEST:
-        must = "a URDF whose axes point somewhere"
+        must = "a URDF whose axes are not zero"
         raise SettingError(field, must, f"joint '{name}': {axis.get('xyz')}")
     texts = [None if limit is None else limit.get(side) for side in ("lower", "upper")]
     low, high = (None if text is None else float(text) for text in texts)
@@ -246,10 +244,9 @@ def _check_tree(links: list[str], joints: dict[str, UrdfJoint], field: str) -> N
                 raise SettingError(field, must, f"a loop: {' → '.join(passed[::-1])}")
             if len(passed) > len(links):
                 break  # it leads into a loop of others, which is told at one of these
-    if len(roots) != 1:
-        must = "a URDF of one tree of links"
-        was = f"{len(roots)} roots: {', '.join(roots)}" if roots else "no link"
-        raise SettingError(field, must, was)
+    must = "a URDF of one tree of links"
+    was = f"{len(roots)} roots: {', '.join(roots)}" if roots else "no link"
+    demand(len(roots) == 1, field, must, was)
 
 
 def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
@@ -257,10 +254,10 @@ def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
         passed = [joint.name]
         while joint.mimic is not None:
             if joint.mimic.source not in joints:
-                must = "a URDF whose joints follow joints that are there"
+                must = "a URDF whose joints follow joints that exist"
                 raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
             joint = joints[joint.mimic.source]
-            must = "a URDF whose joints do not follow themselves"
+            must = "a URDF whose joints follow other joints"
             demand(joint.name not in passed, field, must, " → ".join([*passed, joint.name]))
             passed.append(joint.name)
 

@@ -3,10 +3,10 @@
 import io
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.attachments import File
 from evoexp.errors import SettingError, demand
@@ -25,8 +25,6 @@ POST = 0.02  # [cell] thickness of bodies that span one node: a box has some
 class GridMotion(Component):
     """A path over a grid whose nodes are one length unit apart (Chen & Zalzala 1995, section 2)."""
 
-    component: ClassVar[str] = "grid_motion"
-
     # how many nodes there are along x, y[, z]
     size: Annotated[tuple[Count, ...], Field(min_length=2, max_length=3)]
     start: Node  # node (x, y[, z]), counted from 0; y points up
@@ -39,8 +37,7 @@ class GridMotion(Component):
     obstacles: tuple[Corners, ...] = ()
     map: File | None = None  # A file with more obstacles, see `read_map`
 
-    @model_validator(mode="after")
-    def _nodes_are_inside(self) -> Self:
+    def _check(self) -> None:
         if math.prod(self.size) > MOST_NODES:
             raise SettingError("size", f"of at most {MOST_NODES:,} nodes", list(self.size))
         inside = " × ".join(f"0..{count - 1}" for count in self.size)
@@ -57,7 +54,6 @@ class GridMotion(Component):
             elif self._are_nodes(corners[:half], corners[half:]):
                 continue
             raise SettingError(f"obstacles[{k}]", must, list(corners))
-        return self
 
     def _are_nodes(self, low: tuple[int, ...], high: tuple[int, ...]) -> bool:
         return all(0 <= a <= b < n for a, b, n in zip(low, high, self.size, strict=True))
@@ -184,6 +180,5 @@ def _read_png(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def _check_size(size: tuple[int, ...], was: tuple[int, ...], field: str) -> None:
-    if was != tuple(size):
-        expected, counts = (" × ".join(map(str, shape)) for shape in (size, was))
-        raise SettingError(field, f"a map of {expected} nodes, as scenario.size says", counts)
+    expected, counts = (" × ".join(map(str, shape)) for shape in (size, was))
+    demand(was == tuple(size), field, f"a map of {expected} nodes, as scenario.size says", counts)

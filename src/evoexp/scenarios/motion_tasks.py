@@ -8,10 +8,10 @@ A posture task of one phase is a reaching task; manoeuvres such as pick-and-plac
 (Corsépius 2001, section 4.3: fitness functions and termination criteria together make a manoeuvre).
 """
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.errors import SettingError, demand, demand_known
 from evoexp.numeric.elementary import DEGREE, acos, atan2
@@ -27,8 +27,6 @@ Point2 = tuple[float, float]
 
 class ArmMotion(SceneTask):
     """Start and goal of every arm, and the obstacles around them."""
-
-    component: ClassVar[str] = "arm_motion"
 
     # configuration of every arm at the start, arm by arm [deg]
     q_start: Annotated[tuple[Vector, ...], Field(min_length=1)]
@@ -58,14 +56,12 @@ class Posture(Settings):
     # the base
     elbow: Literal["left", "right"] | None = None
 
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
+    def _check(self) -> None:
         if (self.angles is None) == (self.tip is None):
             was = None if self.angles is None else "both"
             raise SettingError("angles", "given, or else tip with elbow", was)
         if (self.tip is None) != (self.elbow is None):
             raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
-        return self
 
     def link_angles(self, field: str, base: FloatArray, lengths: FloatArray) -> FloatArray:
         """Return the link angles (2,) [deg] of a robot at a base (2,), with link lengths (2,)."""
@@ -82,8 +78,6 @@ class Posture(Settings):
 
 class LinkMotion(SceneTask):
     """Start and goal of every planar robot of two links, and the obstacles around them."""
-
-    component: ClassVar[str] = "link_motion"
 
     # posture of every robot at the start
     q_start: Annotated[tuple[Posture, ...], Field(min_length=2)]
@@ -115,8 +109,6 @@ class LinkMotion(SceneTask):
 class Docking(SceneTask):
     """A place and a load for the tip of a mobile arm (Chen & Zalzala 1995, section 4.2)."""
 
-    component: ClassVar[str] = "docking"
-
     target: Point2  # X_e, Y_e of the end-effector [length unit]
     force: Point2  # F that acts on it (x, y)
 
@@ -131,8 +123,6 @@ class Docking(SceneTask):
 
 class Mission(Component):
     """Both examples of Chen & Zalzala 1995: a platform drives over a grid, then its arm docks."""
-
-    component: ClassVar[str] = "mission"
 
     grid: GridMotion  # the floor; its goal is where the platform is expected to dock
     docking: Docking  # the task of the arm, in a plane whose origin is at `task_origin`
@@ -154,8 +144,6 @@ class Mission(Component):
 
 class PickAndPlace(SceneTask):
     """Start posture, via point and goal point of a planar arm's tip (Lavoie & Boudreau 2001, 4)."""
-
-    component: ClassVar[str] = "pick_and_place"
 
     # posture at the start, joint angles relative to the link before [rad]
     q_start: Annotated[Vector, Field(min_length=1)]
@@ -287,8 +275,6 @@ class Phase(Settings):
 class PostureTask(SceneTask):
     """Start posture, phases and surroundings of one arm; obstacles may be grasped."""
 
-    component: ClassVar[str] = "posture_task"
-
     # posture at the start [deg], lengths for sliding joints
     q_start: Annotated[Vector, Field(min_length=1)]
     # what is to be done, one after the other
@@ -302,12 +288,11 @@ class PostureTask(SceneTask):
     # how deep pairs that may touch may overlap; None where no phase has such pairs [length
     # unit]
     allowed_penetration: Positive | None = None
-    # whether all obstacles are taken away but those that a goal or a grasp names: the control
-    # by which obstacles are judged
+    # whether all obstacles are taken away, except the ones that a goal or a grasp names: the
+    # control by which obstacles are judged
     empty_scene: bool = False
 
-    @model_validator(mode="after")
-    def _holds_one_thing_at_a_time(self) -> Self:
+    def _check(self) -> None:
         for k, name in enumerate(self.all_names):
             must = "a name that no other obstacle has"
             demand(name not in self.all_names[:k], f"obstacles[{k}].name", must, name)
@@ -334,7 +319,6 @@ class PostureTask(SceneTask):
                 must = f"given: {field}.contacts allows contacts"
                 raise SettingError("allowed_penetration", must, None)
         demand(any(self.up), "up", "a direction, not (0, 0, 0)", list(self.up))
-        return self
 
     @property
     def objects(self) -> tuple[Obstacle, ...]:
@@ -343,7 +327,7 @@ class PostureTask(SceneTask):
 
     @property
     def all_names(self) -> tuple[str, ...]:
-        """Names of the obstacles, those that an empty scene takes away included."""
+        """Names of all obstacles, even if an empty scene takes them away."""
         return tuple(one.name or f"obstacle_{k + 1}" for k, one in enumerate(self.obstacles))
 
     @property

@@ -59,9 +59,9 @@ class MoveitTask(Component):
     scene: File  # A `moveit_msgs/PlanningScene`
     request: File  # A `moveit_msgs/MotionPlanRequest`
     security_margin: NonNegative  # clearance between bodies that the task requires [m]
-    # of the tool at a goal of joints, for planners that end at poses [m]
+    # of the tool's position at a goal of joints, for planners that end at poses [m]
     position_tolerance: Positive
-    angle_tolerance: Positive  # the same of its orientation [deg]
+    angle_tolerance: Positive  # of its orientation [deg]
     meshes: tuple[SceneMesh, ...] = ()  # that the scene names by their files
     # the id of a fixed transform that names its frame; `header` where a scene has other
     # frames than one. Runs before November 2026 took the child's, and are refused

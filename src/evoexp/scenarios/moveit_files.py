@@ -291,8 +291,7 @@ def check_message(root: dict[str, Any], message: str, field: str) -> None:
                 hint = f"; write the part below '{key}' into a file of its own"
                 raise SettingError(field, must, f"one below '{key}'", hint)
         for other in (SCENE, REQUEST):
-            if FIELDS[other].keys() & root.keys():
-                raise SettingError(field, must, f"a {other}")
+            demand(FIELDS[other].keys().isdisjoint(root), field, must, f"a {other}")
     check_fields(root, message, field)
 
 

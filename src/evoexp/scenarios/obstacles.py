@@ -102,7 +102,7 @@ Obstacle = Annotated[
 ]
 
 
-class SceneTask(Component):
+class SceneTask(Component, is_base=True):
     """Base of tasks among obstacles."""
 
     security_margin: NonNegative  # clearance between bodies that the task requires [length unit]

@@ -287,8 +287,7 @@ def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
     notes = {name: manifest.get(name) or None for name in ORIGIN}
     experiment, label = notes["experiment"], notes["label"]
     rows = sorted(
-        rows_of(condition_id),
-        key=lambda row: (row.experiment != experiment, row.label != label),
+        rows_of(condition_id), key=lambda row: (row.experiment != experiment, row.label != label)
     )
     labels = {row.label for row in shipped() if row.experiment == experiment}
     is_named = label is not None and label not in labels

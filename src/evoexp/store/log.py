@@ -137,19 +137,9 @@ class Log:
             own_state = block.states[k] if block.states else state
             parts = self._link, costs, self._best, own_state
             self._link = xxhash.xxh3_128_digest(b"".join(parts))
-            row = GenerationRow(
-                index=block.first + k,
-                best_cost=best.cost,
-                best_cost_in_generation=block.lowest[k],
-                mean_cost=block.means[k],
-                std_cost=block.deviations[k],
-                num_feasible=block.num_feasible[k],
-                evaluations=block.evaluations[k],
-                collision_queries=block.collision_queries[k],
-                solved=best.solved,
-                terms=best.terms,
-                chain=self._link.hex(),
-            )
+            counted = [getattr(block, column)[k] for column in records.COLUMNS]
+            found = best.solved, best.terms, self._link.hex()
+            row = GenerationRow._make((block.first + k, best.cost, *counted, *found))
             data, is_first = encode_generation(row), not self._channels
             self._add(GENERATION_TOPIC, GenerationRow, row.index, data, tuple(row.terms))
             if is_first or self._best_cost < self._written_cost:

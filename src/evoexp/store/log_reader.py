@@ -1,7 +1,7 @@
-"""Logs read back: whole and verified, or only the part that is asked for.
+"""Logs read back: whole and verified, or only the requested part.
 
-A log may come from anybody, and checksums are no proof of good will: every reader first checks all
-bytes, before mcap's reader sees them. Whatever a file claims, what is read of it takes memory in
+A log may come from anybody, and right checksums do not make it safe: every reader first checks all
+bytes, before mcap's reader sees them. Whatever sizes a file claims, reading takes memory in
 proportion to `MAX_LOG` and `MAX_MESSAGE`. Only `read_log` also decodes every message and compares
 the content digest.
 """
@@ -143,7 +143,7 @@ def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
             if content_size > MAX_CHUNK:
                 raise ValueError(f"a chunk of {content_size} bytes; at most {MAX_CHUNK} are read")
             if zstandard.get_frame_parameters(frame).content_size != content_size:
-                raise ValueError("a chunk is not of the size that it tells")
+                raise ValueError("a chunk does not have the size that it states")
             size += content_size
             if size > MAX_LOG:
                 raise ValueError(f"too large: {_too_large(size)}")
@@ -219,7 +219,7 @@ def _opened(source: Source) -> Iterator[CheckedLog]:
             [each.offset for each in summary.attachment_indexes],
         ]
         if told != _places(content, summary_start - _DATA_END.size, log):
-            raise CorruptLog(f"{name}: altered: its index does not tell the records that it holds")
+            raise CorruptLog(f"{name}: altered: its index does not list the records that it holds")
         if written.RUN not in log.records:
             must = f"an MCAP without metadata record '{written.RUN}'"
             raise CorruptLog(f"{name}: not a log of evoexp: {must}")

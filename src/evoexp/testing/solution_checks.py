@@ -81,7 +81,7 @@ def samples_are_judged_alike(condition: Condition) -> Iterator[Demand]:
         return
     found = evolution(condition)
     planner, problem = found.planner, found.problem
-    must = f"sample must return {NUM_SAMPLES} individuals where so many are asked for"
+    must = f"sample must return {NUM_SAMPLES} individuals when asked for {NUM_SAMPLES}"
     yield NUM_SAMPLES in drawn.shape, must, f"an array {drawn.shape}"
     again = planner.sample(problem, condition.rng(0), NUM_SAMPLES)
     must = "sample must draw the same individuals from the same state of rng"
@@ -92,13 +92,13 @@ def samples_are_judged_alike(condition: Condition) -> Iterator[Demand]:
     must = f"cost must judge each of {NUM_SAMPLES} individuals by a number or inf"
     yield costs.shape == (NUM_SAMPLES,) and not np.isnan(costs).any(), must, costs
     twice = np.array(planner.cost(problem, again).cost)
-    must = "cost must judge a population alike a second time"
+    must = "cost must return the same costs a second time"
     yield np.array_equal(costs, twice), must, f"{costs}, then {twice}"
     if found.last.costs.ndim == 1:  # else individuals are judged by those beside them
         axis = -1 if drawn.shape[-1] == NUM_SAMPLES else 0
         single = (np.ascontiguousarray(drawn.take([k], axis)) for k in range(NUM_SAMPLES))
         alone = np.array([planner.cost(problem, each).cost[0] for each in single])
-        must = "cost must judge an individual the same alone and among others"
+        must = "cost must return the same for an individual alone and among others"
         yield np.array_equal(costs, alone), must, f"{alone} alone, {costs} together"
 
 
@@ -114,7 +114,7 @@ def recorded_costs_are_those_of_the_population(condition: Condition) -> Iterator
         if costs.ndim == 1 and as_drawn and not OF_THE_SEARCH & generation.terms.keys():
             judged = found.planner.cost(found.problem, np.ascontiguousarray(population)).cost
             where = f"generation {generation.index}"
-            must = f"costs of {where} must be those that cost gives its population"
+            must = f"costs of {where} must equal what cost returns for its population"
             yield np.array_equal(judged, costs), must, "others"
 
 

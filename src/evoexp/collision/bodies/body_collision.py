@@ -141,7 +141,7 @@ def _pack_bodies(
         places = (next_part, next_part + len(pieces)) if len(pieces) > 1 else (k, k + 1)
         bodies.append((frame, begin[0], len(runs), begin[1], len(capsules), 0, 0, 0, *places))
         balls.append(_ball(start, axis, radius, own))
-    nothing, of = np.empty(0, dtype=np.int64), capsules
+    of, filled_later = capsules, list[Any]([*[np.empty(0)] * 7, 0.0])
     return body_tables.BodyTables(
         table.chain,
         obstacles,
@@ -151,14 +151,7 @@ def _pack_bodies(
         np.array(runs, dtype=np.int64).reshape(-1, 2),
         np.column_stack([start[spheres], radius[spheres]]),
         np.column_stack([start[of], axis[of], radius[of], 1.0 / square[of]]),
-        np.empty((0, 4)),
-        nothing,
-        nothing,
-        nothing,
-        nothing,
-        np.empty(0),
-        np.empty(0),
-        0.0,
+        *filled_later,
     )
 
 

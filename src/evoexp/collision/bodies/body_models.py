@@ -9,7 +9,7 @@ other robots, pairs that never touch are proven to, and so nobody judges them.
 """
 
 import itertools
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,11 +42,11 @@ class BodyPairs(NamedTuple):
     tested: tuple[Pair, ...]  # pairs that a search tests and the certifier judges
     # pairs on one joint or on neighbouring ones, or disabled: nobody judges them
     adjacent: tuple[Pair, ...]
-    always: tuple[Pair, ...] = ()  # pairs that touch in every posture sampled: nobody judges them
+    always: tuple[Pair, ...] = ()  # pairs that touch in every sampled posture: nobody judges them
     never: tuple[Pair, ...] = ()  # pairs that are proven never to touch: nobody judges them
-    # pairs that touch in no posture sampled: only the certifier judges them
+    # pairs that touch in no sampled posture: only the certifier judges them
     unseen: tuple[Pair, ...] = ()
-    # pairs whose covers touch in every posture sampled although the bodies do not: only the
+    # pairs whose covers touch in every sampled posture although the bodies do not: only the
     # certifier judges them
     overlapping: tuple[Pair, ...] = ()
     # pairs whose covers always touch, tested by maps of their distances
@@ -130,7 +130,7 @@ def _grid(
     return q, float(np.sum(way[moving] * 0.5 * step))
 
 
-class CollisionModel(Component):
+class CollisionModel(Component, is_base=True):
     """Base of the collision models that cover bodies: sphere sets and capsules."""
 
     def cover(self, item: Any, given: FloatArray | None = None) -> body_covers.Cover:
@@ -150,8 +150,6 @@ class CollisionModel(Component):
 class SphereSets(CollisionModel):
     """Bodies as sets of spheres that cover them."""
 
-    component: ClassVar[str] = "sphere_sets"
-
     # how far spheres may reach beyond a body; less takes more spheres [length unit]
     inflation: Positive
 
@@ -164,8 +162,6 @@ class SphereSets(CollisionModel):
 
 class BodyCapsules(CollisionModel):
     """Bodies as one capsule each that covers them; balls and capsules as they are."""
-
-    component: ClassVar[str] = "body_capsules"
 
     padding: NonNegative  # by how much every capsule is thicker than it must be [length unit]
     # whether the capsule of a cylinder is as thick as the cylinder and reaches beyond its
@@ -223,13 +219,13 @@ class BodyModel(NamedTuple):
         named, most = list(zip(names, self.covers, strict=True)), self.asked * (1.0 + 1e-6)
         if out := [f"{name} {c.uncovered:.3g}" for name, c in named if c.uncovered > 0.0]:
             sizes = ", ".join(out)
-            lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {sizes}")
+            lines.append(f"given spheres do not contain all bodies; uncovered [{unit}]: {sizes}")
         if wide := [f"{name} {c.inflation:.3g}" for name, c in named if c.inflation > most]:
             sizes = ", ".join(wide)
             if self.assembly.frames is not None:  # out of a URDF
-                sizes += "; robot.decomposition or robot.spheres bring closer ones"
-            must = f"the {self.asked:g} {unit} asked for"
-            lines.append(f"covers that reach farther than {must}: {sizes}")
+                sizes += "; robot.decomposition or robot.spheres give closer covers"
+            must = f"the requested {self.asked:g} {unit}"
+            lines.append(f"covers that reach beyond {must}: {sizes}")
         # pairs of bodies, and covers made smaller
         pairs, where = self.sorted_pairs, "the start or the goal"
         unjudged = {
@@ -237,9 +233,9 @@ class BodyModel(NamedTuple):
             "always touch, not tested": pairs.always,
             "never touch, not tested": pairs.never,
         }
-        covers = "covers touch in every posture sampled"
+        covers = "covers touch in every sampled posture"
         groups = (unjudged if is_complete else {}) | {
-            "touch in no posture sampled, judged by the certifier only": pairs.unseen,
+            "touch in no sampled posture, judged by the certifier only": pairs.unseen,
             f"{covers}, judged by the certifier only": pairs.overlapping,
             f"{covers}, tested by maps of exact distances": pairs.mapped,
         }

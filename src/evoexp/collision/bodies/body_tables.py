@@ -17,18 +17,8 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import SPATIAL_FRAME, SPATIAL_ROWS, VECTOR, Eight, KinematicChain, U
 from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE, ObstacleTable
 
-(
-    JOINT,
-    FIRST_RUN,
-    STOP_RUN,
-    FIRST_CAPSULE,
-    STOP_CAPSULE,
-    FIRST_BALL,
-    FIRST_HALF_SPACE,
-    STOP_ENTRY,
-    FIRST_PART,
-    STOP_PART,
-) = range(10)
+JOINT, FIRST_RUN, STOP_RUN, FIRST_CAPSULE, STOP_CAPSULE = range(5)
+FIRST_BALL, FIRST_HALF_SPACE, STOP_ENTRY, FIRST_PART, STOP_PART = range(5, 10)
 """Columns of `BodyTables.units`. Entries are balls around obstacles first, then half-spaces; parts
 are units."""
 
@@ -107,35 +97,18 @@ def flattened(tables: BodyTables) -> FlatTables:
 def named_tables(n: FloatArray, i: IntArray) -> BodyTables:
     """Return the blocks of the flat arrays as views."""
     chain = KinematicChain(
-        _column(i, i, 0),
-        _column(i, i, 1),
-        _column(i, i, 2),
-        _column(i, i, 3),
-        _rows(n, i, 4, 9),
-        _rows(n, i, 5, 3),
-        _rows(n, i, 6, 2),
-    )
+        _column(i, i, 0), _column(i, i, 1), _column(i, i, 2), _column(i, i, 3),
+        _rows(n, i, 4, 9), _rows(n, i, 5, 3), _rows(n, i, 6, 2),
+    )  # fmt: skip
     obstacles = ObstacleTable(
         _column(i, i, 7), _rows(n, i, 8, 3), _rows(n, i, 9, 9), _rows(n, i, 10, 3)
     )
     return BodyTables(
-        chain,
-        obstacles,
-        _rows(n, i, 11, 5),
-        _rows(i, i, 12, 10),
-        _rows(n, i, 13, 4),
-        _rows(i, i, 14, 2),
-        _rows(n, i, 15, 4),
-        _rows(n, i, 16, 8),
-        _rows(n, i, 17, 4),
-        _column(i, i, 18),
-        _rows(i, i, 19, 5),
-        _rows(i, i, 20, 2),
-        _rows(i, i, 21, 5),
-        _rows(n, i, 22, 4),
-        _column(n, i, 23),
-        n[i[2 * 24]],
-    )
+        chain, obstacles, _rows(n, i, 11, 5), _rows(i, i, 12, 10), _rows(n, i, 13, 4),
+        _rows(i, i, 14, 2), _rows(n, i, 15, 4), _rows(n, i, 16, 8), _rows(n, i, 17, 4),
+        _column(i, i, 18), _rows(i, i, 19, 5), _rows(i, i, 20, 2), _rows(i, i, 21, 5),
+        _rows(n, i, 22, 4), _column(n, i, 23), n[i[2 * 24]],
+    )  # fmt: skip
 
 
 @inlined

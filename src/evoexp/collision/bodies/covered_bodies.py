@@ -24,7 +24,6 @@ from evoexp.validation import Component, LayoutCount
 class CoveredBodies(Component):
     """Bodies covered by spheres or capsules, tested at and between the via-points of a path."""
 
-    component: ClassVar[str] = "covered_bodies"
     revision: ClassVar[int] = 2
 
     covers: CollisionModel  # how bodies are covered

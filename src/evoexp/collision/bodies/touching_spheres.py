@@ -7,7 +7,7 @@ here.
 
 import itertools
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -35,8 +35,6 @@ class TouchingSpheres(Component):
 
     Section 4.1 leaves out the columns.
     """
-
-    component: ClassVar[str] = "touching_spheres"
 
     # centres at equal distances from joint to joint, both ends included
     spheres_per_link: Annotated[int, Field(ge=1, le=MOST_PER_LINK)]

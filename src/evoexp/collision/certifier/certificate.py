@@ -38,8 +38,8 @@ class Certificate(NamedTuple):
     Pairs that may touch count for `certified` and `refuted_at` alone, by their depth.
     """
 
-    # whether the bodies never touch, and those that may never overlap deeper than they may; None:
-    # undecided
+    # whether no bodies touch but for allowed contacts, and these are nowhere deeper than allowed;
+    # None: undecided
     certified: bool | None = None
     # whether they never come closer than the security margin; None: undecided
     certified_margin: bool | None = None

@@ -163,37 +163,26 @@ def least_separation(
     if work.stamps[-2] != work.stamps[-1]:
         work.stamps[-2] = work.stamps[-1]
         joint_twists(task.chain, task.coefficients[segment], u, work.frames, work.twists)
-    bodies, world, twists, scratch = task.bodies, work.world, work.twists, work.scratch
-    one, two, normal = task.pairs[pair, 0], task.pairs[pair, 1], work.normals[pair]
-    before = separation_later(bodies, world, twists, one, two, normal, -half, scratch)
-    return min(before, separation_later(bodies, world, twists, one, two, normal, half, scratch))
+    return min(_gap_later(task, work, pair, -half), _gap_later(task, work, pair, half))
 
 
 @inlined
-def separation_later(
-    bodies: BodyTable,
-    world: FloatArray,
-    twists: FloatArray,
-    one: int,
-    two: int,
-    normal: FloatArray,
-    later: float,
-    scratch: FloatArray,
-) -> float:
-    """Return the gap of two bodies across a normal, `later` ahead, at constant velocities.
+def _gap_later(task: Task, work: Workspace, pair: int, later: float) -> float:
+    """Return the gap across a pair's last normal, `later` ahead, at constant velocities.
 
     A point x of a body then stands at x + later (v + ω × x), at a height
     n·x + later (n·v + (n × ω)·x) that is linear in x: the least and the greatest height are those
     of support points in a turned direction. The gap is a concave function of `later`. The normal
     leads from the second to the first, and has any length.
     """
+    bodies, world, twists, normal = task.bodies, work.world, work.twists, work.normals[pair]
     length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
     if not length > 0.0:
         return -np.inf
     nx, ny, nz = normal[0] / length, normal[1] / length, normal[2] / length
-    gap, turned, point = 0.0, scratch[2], scratch[1]
+    gap, turned, point = 0.0, work.scratch[2], work.scratch[1]
     for side in range(2):
-        body, sign = (one, -1.0) if side == 0 else (two, 1.0)
+        body, sign = task.pairs[pair, side], -1.0 if side == 0 else 1.0
         joint = bodies.joint[body]
         # the normal turned with the body, and the height that its velocity adds
         turned[0], turned[1], turned[2], moved = nx, ny, nz, 0.0

@@ -52,8 +52,8 @@ def certify(scene: Scene, motion: Motion, security_margin: float | FloatArray = 
     Args:
         scene: The bodies; read only.
         motion: In the units of the model: radians, lengths.
-        security_margin: Clearance that the task requires [length unit]: of every pair of bodies, or
-            (pairs,) of each.
+        security_margin: Clearance that the task requires [length unit], one for all pairs of bodies
+            or (pairs,) one for each.
 
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
@@ -62,10 +62,10 @@ def certify(scene: Scene, motion: Motion, security_margin: float | FloatArray = 
 
 
 def is_clear(scene: Scene, motion: Motion, security_margin: float | FloatArray = 0.0) -> bool:
-    """Return whether no two bodies are proven ever to touch, nor to come closer than a margin.
+    """Return whether it is proven that no bodies ever touch, or come closer than a margin.
 
-    It answers as `certify` does, yet measures no clearance: it ends at any contact that it meets,
-    and looks no closer at pairs that cannot come near. Undecided is no.
+    It answers as `certify` does, but measures no clearance: it ends at the first contact that it
+    meets, and does not refine pairs that cannot come near. Undecided counts as no.
 
     Raises:
         ValueError: As `certify`.
@@ -81,11 +81,7 @@ class _Candidate(NamedTuple):
 
 class _Judgement:
     def __init__(
-        self,
-        scene: Scene,
-        motion: Motion,
-        security_margin: float | FloatArray,
-        resolution: float,
+        self, scene: Scene, motion: Motion, security_margin: float | FloatArray, resolution: float
     ) -> None:
         _check(scene, motion, security_margin)
         self.margins = np.empty(len(scene.pairs))

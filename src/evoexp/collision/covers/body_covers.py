@@ -73,8 +73,8 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
     Balls and capsules are covered by equal spheres on their axis, convex pieces of meshes by
     spheres of different radii (`varied_spheres`), everything else by spheres around the cells of a
     lattice, with as few cells as keep within the inflation. Where that takes more than
-    `MOST_SPHERES`, a mesh is covered as pieces are, all else by those that reach the least beyond
-    it.
+    `MOST_SPHERES`, a mesh is covered as pieces are, all else by the spheres that reach the least
+    beyond it.
 
     Args:
         item: A `pin.GeometryObject` with a convex coal shape or a mesh; of a mesh the convex hull

@@ -239,8 +239,7 @@ def _cells(solid: Solid, least: float) -> _Cells | None:
         if count + len(middles) > 8 * MOST_CELLS or count > MOST_CELLS:
             return None
     return _Cells(
-        np.vstack([each.middles for each in found]),
-        np.concatenate([each.sizes for each in found]),
+        np.vstack([each.middles for each in found]), np.concatenate([each.sizes for each in found])
     )
 
 

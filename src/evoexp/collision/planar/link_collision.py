@@ -3,7 +3,7 @@
 Links are lines, or have envelopes.
 """
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,6 @@ from evoexp.validation import Component, LayoutCount, NonNegative
 
 class LinkCrossings(Component):
     """Planar robots of two links, which collide where their lines meet (Eqs. 4, 5, 11, 12)."""
-
-    component: ClassVar[str] = "link_crossings"
 
     # configurations tested per segment of a path; 1: the encoded ones only, as in the paper
     collision_substeps: LayoutCount

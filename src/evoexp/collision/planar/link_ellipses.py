@@ -12,7 +12,7 @@ tested again. The others go through all positions, and the chords of their link 
 the way, eight individuals at a time (`load_lanes`).
 """
 
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -197,8 +197,6 @@ def gap(u: Any, v: Any, p: Any, q: Any) -> Any:
 
 class LinkEllipses(Component):
     """Exact tests of positions and chords along a joint-space line; contact is collision."""
-
-    component: ClassVar[str] = "link_ellipses"
 
     # M of Eq. 3: equally spaced positions that are tested, the end included, the start not
     num_positions: LayoutCount

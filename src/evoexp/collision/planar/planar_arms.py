@@ -227,7 +227,7 @@ def meeting(one: Line, two: Line, tolerance: float) -> Mask:
     """Return whether two segments cross, or are at most `tolerance` apart.
 
     They cross if the ends of each lie on both sides of the other's line. Segments on one line have
-    rounded sides; those that do not touch are told apart by the boxes around them.
+    rounded sides; the boxes around them show whether they are apart.
     """
     (ax, ay, bx, by), (cx, cy, dx, dy) = one, two
     overlap = (lower(ax, bx) <= upper(cx, dx)) & (lower(cx, dx) <= upper(ax, bx))

@@ -1,7 +1,5 @@
 """Crossover of genomes at one point or gene by gene."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from evoexp.evolution.operators.operator import Context, Crossover, Genome
@@ -25,8 +23,6 @@ class OnePoint(Crossover):
     The site is before one of the genes 1 … genes − 1, each equally likely.
     """
 
-    component: ClassVar[str] = "one_point"
-
     def num_uniforms(self, genome: Genome, count: int) -> int:
         """Return two for every pair: decision and site."""
         return 2 * (count // 2)
@@ -45,8 +41,8 @@ class OnePoint(Crossover):
                     out[gene, first], out[gene, second] = out[gene, second], out[gene, first]
 
 
-class GeneCrossover(Crossover):
-    """A crossover that makes every gene of two children of that gene of two parents."""
+class GeneCrossover(Crossover, is_base=True):
+    """A crossover that makes each gene of two children from the same gene of two parents."""
 
     def num_uniforms(self, genome: Genome, count: int) -> int:
         """Return one for every pair, its decision, and two for each of its genes."""
@@ -80,8 +76,6 @@ def replace_pair(
 class UniformCrossover(GeneCrossover):
     """Exchanges every gene with probability 1/2 (Syswerda 1989)."""
 
-    component: ClassVar[str] = "uniform_crossover"
-
     @staticmethod
     @kernel
     def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
@@ -99,8 +93,6 @@ class ArithmeticCrossover(GeneCrossover):
 
     The children are λ x + (1 − λ) y and (1 − λ) x + λ y, one λ in [0, 1) per pair.
     """
-
-    component: ClassVar[str] = "arithmetic_crossover"
 
     @staticmethod
     @kernel
@@ -120,8 +112,6 @@ class BlxAlpha(GeneCrossover):
     It is uniform in [l − α d, h + α d), where l and h are the lesser and the greater of both
     parents' genes and d = h − l.
     """
-
-    component: ClassVar[str] = "blx_alpha"
 
     # α: how far beyond the parents children may lie, in units of their distance [-]
     blend_alpha: NonNegative = 0.5

@@ -11,8 +11,8 @@ from evoexp.records import FloatArray
 from evoexp.validation import NonNegativeCount, Positive
 
 
-class GeneMutation(Mutation):
-    """A mutation of every gene with its rate, or of one gene of an individual."""
+class GeneMutation(Mutation, is_base=True):
+    """Mutates every gene with the rate, or one gene of an individual."""
 
     # whether an individual is mutated with the rate, in one gene; else every gene is
     one_gene: bool = False
@@ -44,13 +44,11 @@ def draw_amounts(num_genes: int, count: int, context: Context) -> FloatArray:
 
 
 class NonUniformMutation(GeneMutation):
-    """Moves a gene towards one of its limits, less and less far (Michalewicz 1992).
+    """Moves a gene towards one of its limits, by ever smaller steps (Michalewicz 1992).
 
     With l and h the limits, x becomes x + (h − x) r s or x − (x − l) r s, each with probability
     1/2; r is uniform in [0, 1) and s = (1 − t/T)^b.
     """
-
-    component: ClassVar[str] = "non_uniform_mutation"
 
     mutation_power: NonNegativeCount = 2  # b, whole [-]
 
@@ -73,7 +71,6 @@ class NonUniformMutation(GeneMutation):
 class GaussianMutation(GeneMutation):
     """Adds s (h − l) z to a gene, z a normal deviate, within its limits l, h (Schwefel 1981)."""
 
-    component: ClassVar[str] = "gaussian_mutation"
     takes_normals: ClassVar[bool] = True
 
     mutation_std: Positive = 0.1  # s, standard deviation in units of a gene's range [-]
@@ -92,8 +89,6 @@ class GaussianMutation(GeneMutation):
 
 class UniformReset(GeneMutation):
     """Draws a gene anew, uniform within its limits (Michalewicz 1992)."""
-
-    component: ClassVar[str] = "uniform_reset"
 
     @staticmethod
     @kernel
@@ -114,8 +109,6 @@ class AlleleMutation(Mutation):
     step], as printed, or in [−step, step) in the symmetric reading. The change is made only if the
     result lies in [l, h), the gene's limits; otherwise the allele keeps its value.
     """
-
-    component: ClassVar[str] = "allele_mutation"
 
     step: Positive  # largest change, in the units of the genes
     symmetric: bool = False  # whether genes may decrease, too
@@ -143,8 +136,6 @@ class AlleleMutation(Mutation):
 
 class BitFlips(Mutation):
     """Flips every bit, 0.0 or 1.0, with the rate as probability (Holland 1975)."""
-
-    component: ClassVar[str] = "bit_flips"
 
     def num_uniforms(self, genome: Genome, count: int) -> int:
         """Return one for every bit."""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeAlias, TypeVa
 
 import numba
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.records import FloatArray, IntArray
@@ -20,7 +20,7 @@ from evoexp.validation import Component, Count, NonNegativeCount, Rate
 
 
 class Genome(NamedTuple):
-    """The genes of a problem, as far as operators need to know them."""
+    """The limits and the layout of a problem's genes."""
 
     limits: FloatArray  # (genes, 2) least and greatest value of each gene
     arms: IntArray  # (arms, 2) first joint of each arm, and the one behind its last
@@ -28,7 +28,7 @@ class Genome(NamedTuple):
 
     @classmethod
     def of(cls, limits: FloatArray) -> "Genome":
-        """Return genes that are no strings of via-points: one arm, one point."""
+        """Return genes that do not form via-points: one arm, one point."""
         return cls(np.ascontiguousarray(limits), np.array([[0, len(limits)]]), 1)
 
 
@@ -49,8 +49,8 @@ _NONE = np.zeros(1), np.zeros((1, 2))
 CONTEXT = numba.typeof(Context(*_NONE, 0.0, 0.0, _NONE[0], Genome.of(_NONE[1])))
 
 
-class Operator(Component):
-    """A component whose numeric fields are what its kernel takes as `settings`, in their order."""
+class Operator(Component, is_base=True):
+    """A component whose kernel takes its numeric fields as `settings`, in their order."""
 
     kernel_name: ClassVar[str]  # of the static method that is the kernel
     signature: ClassVar[Any]  # of every kernel of the kind
@@ -71,7 +71,7 @@ def _address(function: Callable[..., None], signature: Any) -> KernelAddress:
     return KernelAddress(function, signature)
 
 
-class Selection(Operator):
+class Selection(Operator, is_base=True):
     """Draws parents by their costs.
 
     Its kernel is the static method `select(costs, context, parents)`:
@@ -90,8 +90,8 @@ class Selection(Operator):
         return count
 
 
-class Crossover(Operator):
-    """Makes offspring of parents; parents 2k and 2k + 1 form a pair, an odd last one stays alone.
+class Crossover(Operator, is_base=True):
+    """Makes offspring from parents; parents 2k and 2k + 1 form a pair, an odd last one stays alone.
 
     Its kernel is the static method `cross(genomes, parents, context, out)`:
 
@@ -110,7 +110,7 @@ class Crossover(Operator):
         raise NotImplementedError
 
 
-class Mutation(Operator):
+class Mutation(Operator, is_base=True):
     """Changes offspring in place.
 
     Its kernel is the static method `mutate(genomes, count, context)`:
@@ -141,10 +141,10 @@ def _by_name(value: Any) -> Any:
 
 
 Named = Annotated[Kind, BeforeValidator(_by_name)]
-"""A field of operators: a component, or the name of one whose settings all have usual values."""
+"""A field of operators: a component, or the name of one whose settings all have defaults."""
 
 
-class PopulationSettings(Component):
+class PopulationSettings(Component, is_base=True):
     """Settings of a generational genetic algorithm; every planner uses the same words."""
 
     population_size: Count  # individuals per generation
@@ -153,11 +153,9 @@ class PopulationSettings(Component):
     crossover_rate: Rate  # probability that a pair of parents is crossed
     mutation_rate: Rate  # probability of a mutation, of whatever the planner mutates
 
-    @model_validator(mode="after")
-    def _elites_fit(self) -> Self:
+    def _check(self) -> None:
         size = self.population_size
         self.demand("num_elites", self.num_elites <= size, f"at most population_size ({size})")
-        return self
 
     @property
     def num_offspring(self) -> int:
@@ -182,8 +180,6 @@ class ScaledGenetic(PopulationSettings):
     replacement. The systematic scan of the remainders is assumed: Chen & Zalzala 1995 name the
     sampling only.
     """
-
-    component: ClassVar[str] = "scaled_genetic"
 
     # copies that the best one expects, in units of the mean [-]
     scaling_multiple: Annotated[float, Field(gt=1.0)]

@@ -1,6 +1,6 @@
 """Selection of parents: by roulette, by tournaments or by ranks."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -15,8 +15,8 @@ from evoexp.validation import Count, NonNegative
 def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -> None:
     """Draw parents with probabilities proportional to their weights (Goldberg 1989).
 
-    If all weights (individuals,) are 0, every individual is equally likely. Neighbours among those
-    chosen (parents,) are a random pairing.
+    If all weights (individuals,) are 0, every individual is equally likely. Neighbours among
+    the chosen (parents,) form random pairs.
     """
     # the wheel: sums of weights up to each individual
     num = len(weights)
@@ -46,11 +46,9 @@ def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -
 class InverseRoulette(Selection):
     """Roulette by 1/cost (Curkovic et al. 2013, methods I–VIII).
 
-    A cost of inf or NaN weighs 0. If any cost is 0, only those of cost 0 can be drawn, each equally
-    likely; below 1e-300 counts as 0: a sum of inverses would overflow.
+    A cost of inf or NaN weighs 0. If any cost is 0, only costs of 0 are drawn, each equally likely.
+    A cost below 1e-300 counts as 0, because a sum of inverses would overflow.
     """
-
-    component: ClassVar[str] = "inverse_roulette"
 
     @staticmethod
     @kernel
@@ -73,8 +71,6 @@ class DifferenceRoulette(Selection):
     likely, and an infeasible individual is still not drawn.
     """
 
-    component: ClassVar[str] = "difference_roulette"
-
     @staticmethod
     @kernel
     def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
@@ -93,8 +89,6 @@ class DifferenceRoulette(Selection):
 class FitnessRoulette(Selection):
     """Roulette by the fitness max(C_max − cost, 0) (Rana & Zalzala 1995, Eq. 7)."""
 
-    component: ClassVar[str] = "fitness_roulette"
-
     fitness_offset: NonNegative  # C_max
 
     @staticmethod
@@ -112,11 +106,9 @@ class LinearRanking(Selection):
     """Roulette by linear ranks (Baker 1985).
 
     With r = 0 for the highest of P costs and P − 1 for the lowest, the weight 2 − s + 2 (s − 1) r /
-    (P − 1) is how often an individual is expected among P parents. Equal costs, infinite ones
-    included, share the mean of their ranks.
+    (P − 1) is the expected number of copies of an individual among P parents. Equal costs, infinite
+    ones included, share the mean of their ranks.
     """
-
-    component: ClassVar[str] = "linear_ranking"
 
     # s: offspring expected of the best one; 1 is no selection at all, 2 leaves the worst without
     rank_pressure: Annotated[float, Field(ge=1.0, le=2.0)] = 2.0
@@ -149,8 +141,6 @@ class Tournament(Selection):
     ones included, the contestant drawn first. So a population without one feasible member is
     sampled uniformly.
     """
-
-    component: ClassVar[str] = "tournament"
 
     tournament_size: Count = 2  # contestants; 1 is no selection at all
 

@@ -20,6 +20,7 @@ from evoexp.report.statistics.judging import Judge, Rules, evidence
 Routes = dict[str, tuple[Any, ...]]
 TERMS = DISTANCE, UNSAFENESS = "term_distance", "term_unsafeness"  # of a path's cost
 COST = "best_cost"
+CONTROLS = {"random_search": "random walks"}  # names in sentences; of others the component's
 
 
 class Group(NamedTuple):
@@ -260,7 +261,8 @@ def evolution(
 ) -> Claim:
     """Judge that evolution helps, and tell its gain over the best control."""
     rows = compared([(condition, c) for c in controls], by_column(COST), judge.settings)
-    names = {c.label: control_name(c) for c in controls}
+    components = {c.label: str(c.condition.planner.component) for c in controls}
+    names = {label: CONTROLS.get(own, own.replace("_", " ")) for label, own in components.items()}
     medians = {names[c.label]: float(np.median(c.column(COST))) for c in controls}
     best = min(medians, key=lambda name: medians[name])
     median = float(np.median(condition.column(COST)))
@@ -275,12 +277,6 @@ def evolution(
     words |= {"verb": "saves" if gain >= 0.0 else "loses"}
     hearing = judge.on("path_evolution", condition=condition.label, controls=" and ".join(medians))
     return hearing.better_than_all(words, rows)
-
-
-def control_name(condition: ConditionResults) -> str:
-    """Return the name of a control in sentences."""
-    component = str(condition.condition.planner.component)
-    return {"random_search": "random walks"}.get(component, component.replace("_", " "))
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {

@@ -151,7 +151,7 @@ def weak_evidence(results: Results, confidence: float) -> Iterator[tuple[str, st
             intervals = {c.label: newcombe(below(c, BOUND), theirs, confidence) for c in own}
             same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
             yield (
-                f"{own[0].label} and others: whose errors below {BOUND:g} cannot be told from the "
+                f"{own[0].label} and others: errors below {BOUND:g} that agree with the "
                 f"printed {100 * theirs.share:.1f} %",
                 f"{len(same)} of {len(own)}{': ' if same else ''}{', '.join(same)} (0 within "
                 f"Newcombe's {100 * confidence:g} % interval of the difference; at most "

@@ -7,7 +7,7 @@ import numpy as np
 
 from evoexp.papers.rana import measures
 from evoexp.papers.rana.measures import AT, BETWEEN, EVENNESS
-from evoexp.planners.baselines.real_vector_controls import IteratedLocalSearch
+from evoexp.planners.baselines.controls import IteratedLocalSearch
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim

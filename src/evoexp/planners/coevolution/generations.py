@@ -2,10 +2,9 @@
 
 import math
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.evolution.operators import operator
@@ -63,8 +62,8 @@ class CoevolutionSettings(operator.PopulationSettings):
     crossover: operator.Named[operator.Crossover] | None = None  # None: at one point
     mutation: operator.Named[operator.Mutation] | None = None  # None: of one allele (Eq. 9)
 
-    @model_validator(mode="after")
-    def _settings_agree(self) -> Self:
+    def _check(self) -> None:
+        super()._check()
         rate, demand = self.mutation_rate, self.demand
         demand("mutation_decay", self.mutation_decay <= rate, f"at most mutation_rate ({rate})")
         has_hall, no_hall = self.hall_depth > 0.0, "where there is no hall (hall_depth is 0)"
@@ -84,7 +83,6 @@ class CoevolutionSettings(operator.PopulationSettings):
         demand("num_elites", self.num_offspring >= 0, must)
         takes_normals = self.mutation is not None and self.mutation.takes_normals
         demand("mutation", not takes_normals, "one that takes uniform numbers only")
-        return self
 
     @property
     def num_hall_teams(self) -> int:
@@ -168,7 +166,6 @@ class TeamSearch(TableSearch):
     present: kernels.Generation  # the one computed last
 
     def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
-        """Begin a run."""
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size
         self._proven = ProvenTeams(planner, problem) if planner.answers_are_proven else None
@@ -231,10 +228,8 @@ class TeamSearch(TableSearch):
         found = self._planner.evaluated(self._problem, populations)
         settled = self._proven.settle(populations, found) if self._proven else None
         best = kernels.survey(found, self.summaries[place])
-        self.present, self.costs[place] = (
-            kernels.Generation(populations, found, settled or best),
-            found.costs,
-        )
+        self.present = kernels.Generation(populations, found, settled or best)
+        self.costs[place] = found.costs
 
     def lowest(self, places: IntArray) -> FloatArray:
         """Return the cost of the best team."""

@@ -50,7 +50,7 @@ class Evaluated(NamedTuple):
 
     @property
     def teamable(self) -> FloatArray:
-        """(robots, individuals) own cost; inf for those that collide with an obstacle."""
+        """(robots, individuals) own cost; inf if it collides with an obstacle."""
         return np.asarray(teamable_costs(self.own, self.blocked))
 
     def team_of(self, individual: int) -> IntArray:
@@ -336,7 +336,7 @@ def survey(found: Evaluated, summary: FloatArray) -> BestTeam:
 
 @kernel
 def teamable_costs(own: FloatArray, blocked: IntArray) -> FloatArray:
-    """Return own costs (robots, individuals); inf of those that collide with an obstacle."""
+    """Return own costs (robots, individuals); inf if one collides with an obstacle."""
     teamable = np.empty(own.shape)
     for r in range(len(own)):
         for k in range(own.shape[1]):

@@ -12,15 +12,14 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import ClassVar, Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.planar.arm_pairs import MOST_CONFIGURATIONS
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
@@ -84,7 +83,7 @@ def length_notes(
         notes += [
             f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "
             f"(printed: {PRINTED_STEPS[0]:g} and {PRINTED_STEPS[1]:g})",
-            f"robot {r + 1}: Eq. 3 asks for L = {asked} here ({turn:g} deg), for L = {worst} over "
+            f"robot {r + 1}: Eq. 3 requires L = {asked} here ({turn:g} deg), L = {worst} over "
             f"{HALF_TURN_DEG:g} deg (printed: {PRINTED_LENGTH})",
             f"robot {r + 1}: L = {chromosome_length} (K = {segments - 1}) takes steps of "
             f"{step:.2f} deg at best, which {verdict}",
@@ -108,7 +107,6 @@ class Problem(NamedTuple):
 class Coevolution(PlannerDefaults, Component):
     """The algorithm of Curkovic et al., sections 2 and 3; Methods I–VIII are settings of it."""
 
-    component: ClassVar[str] = "coevolution"
     revision: ClassVar[int] = 2
 
     # L, even: two link angles for each of K = L/2 configurations between start and goal [-]
@@ -121,17 +119,15 @@ class Coevolution(PlannerDefaults, Component):
     ga: CoevolutionSettings  # populations, generations, rates, hall of fame
     objective: MotionCriteria  # weights of C1 … C4
     collision: LinkCrossings  # links as lines, or their envelopes
-    # which teams are an answer: those that the model accepts at the configurations it tests,
-    # or those of them whose motion the exact certifier proves; robots of one that is refuted
-    # count as colliding once more
+    # which teams are an answer: all that the model accepts at the configurations it tests, or
+    # only teams whose motion the exact certifier also proves; robots of a refuted team count
+    # as colliding once more
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _genes_come_in_pairs(self) -> Self:
+    def _check(self) -> None:
         fits = self.chromosome_length >= 2 and self.chromosome_length % 2 == 0
         must = "even and at least 2: two link angles per configuration"
         self.demand("chromosome_length", fits, must)
-        return self
 
     @property
     def num_configurations(self) -> int:
@@ -142,9 +138,8 @@ class Coevolution(PlannerDefaults, Component):
         """Build the robots and check that start and goal fit them and are free of collision."""
         assembly = robot.build()
         collision = self.collision.bind(assembly, scenario.obstacles)
-        if len(collision.arms) < 2:
-            must = "two robots or more, which evolve together"
-            raise SettingError("robot", must, len(collision.arms))
+        must = "two robots or more, which evolve together"
+        demand(len(collision.arms) >= 2, "robot", must, len(collision.arms))
         arms = np.array([(*arm.base, *arm.lengths) for arm in collision.arms])
         start, goal = (DEGREE * ends for ends in scenario.ends(arms[:, :2], arms[:, 2:]))
         moving = np.array([r not in scenario.stationary for r in range(len(arms))])
@@ -152,7 +147,8 @@ class Coevolution(PlannerDefaults, Component):
         for name, posture in (("q_start", start), ("q_goal", goal)):
             if contact := collision.contact(posture):
                 relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1)
-                closest = " and ".join(bodies.nearest_pair(relative.ravel()))
+                distances = bodies.distances(relative.ravel())
+                closest = " and ".join(bodies.pair_names(int(np.argmin(distances))))
                 must = f"free of collision ({contact}: {closest})"
                 raise SettingError(f"scenario.{name}", must, (posture / DEGREE).round(9).tolist())
         return Problem(assembly, collision, arms, start, goal, moving, bodies, margin)
@@ -180,9 +176,11 @@ class Coevolution(PlannerDefaults, Component):
     def evaluated(self, problem: Problem, populations: FloatArray) -> kernels.Evaluated:
         """Evaluate populations (robots, 2 K, individuals), all against all other robots (Eq. 4)."""
         collision, (robots, _, count) = problem.collision, populations.shape
-        weights = self.objective.own_weights, self.objective.collision_weight
+        cost = self.objective
+        own_weights = cost.path_weight, cost.rotation_weight, cost.evenness_weight
         envelope = self.collision.half_width, self.collision.tcp_radius
-        task = kernels.LineTask(problem.start, problem.goal, problem.arms, *weights, *envelope)
+        ends, weights = (problem.start, problem.goal), (own_weights, cost.collision_weight)
+        task = kernels.LineTask(*ends, problem.arms, *weights, *envelope)
         found = kernels.Evaluated.room(robots, count)
         # paths, and C2 … C4 (Eqs. 6–8)
         shape, is_lines = (robots, self.num_configurations + 2), collision.is_lines

@@ -1,11 +1,11 @@
 """Hill climbing on grid paths: the mutation of `grid_path_ga` alone, without evolution."""
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.random_stream import Draws
 from evoexp.paths.grids import NodeArray
@@ -27,15 +27,12 @@ class PathClimbing(WrappedPlanner):
     makes as many trials as the planner evaluates individuals.
     """
 
-    component: ClassVar[str] = "path_climbing"
-
     num_paths: Count  # paths that climb side by side
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
-        if not isinstance(self.planner, GridPathGa):
-            must = f"left out: {self.planner.component} has no paths over a grid"
-            raise SettingError("control", must, self.component)
+        must = f"left out: {self.planner.component} has no paths over a grid"
+        demand(isinstance(self.planner, GridPathGa), "control", must, self.component)
         if self.num_paths > self.planner.num_evaluations(0):
             must = f"at most ga.population_size ({self.planner.num_evaluations(0)})"
             raise SettingError("control.num_paths", must, self.num_paths)

@@ -5,20 +5,19 @@ valid by construction: random walks make permitted moves, and crossover and muta
 cost is the weighted sum of its length and the mean unsafeness of its nodes.
 
 A population is a table of whole numbers, see `paths.grids`; a solution is flat: the
-coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
+coordinates x, y[, z] of all its nodes, one after the other.
 """
 
 import functools
 from collections.abc import Iterator
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Part, Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.paths import grids
@@ -47,16 +46,12 @@ BLOCK = 16384  # uniform numbers drawn at once, at least
 class PathCost(Component):
     """Weights of Eq. 1, C = ε D + λ S."""
 
-    component: ClassVar[str] = "path_cost"
-
     distance_weight: NonNegative  # ε, of the length D (Eq. 2) [1/cell]
     unsafeness_weight: NonNegative  # λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-]
 
-    @model_validator(mode="after")
-    def _something_costs(self) -> Self:
+    def _check(self) -> None:
         must = "above 0, or unsafeness_weight is: else all paths cost 0"
         self.demand("distance_weight", any(self.weights), must)
-        return self
 
     @property
     def weights(self) -> tuple[float, float]:
@@ -69,9 +64,8 @@ class Problem(NamedTuple):
 
     fields: Fields  # grid, unsafeness, potentials
     moves: grids.Moves  # the moves of walks to the goal, and their weights
-    sums: (
-        grids.SumArray
-    )  # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
+    # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
+    sums: grids.SumArray
     ends: tuple[int, int]  # indices of start and goal
     world: World  # grid and fields, as the kernels take them
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
@@ -81,7 +75,6 @@ class Problem(NamedTuple):
 class GridPathGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 2.3."""
 
-    component: ClassVar[str] = "grid_path_ga"
     revision: ClassVar[int] = 3
 
     revisits: bool  # whether a path may pass a node again; if not, all loops are erased
@@ -159,13 +152,11 @@ class GridPathGa(PlannerDefaults, Component):
         """Return D, S and cost of a path, and the numbers of its faults; with one it costs inf."""
         nodes, own = self._nodes(problem, solution), problem.fields.grid
         last = np.array(own.free.shape) - 3
-        if len(nodes) < 2:
-            raise SettingError("path", "two nodes at least", nodes.tolist())
+        demand(len(nodes) >= 2, "path", "two nodes at least", nodes.tolist())
         are_nodes = ((nodes == np.floor(nodes)) & (nodes >= 0) & (nodes <= last)).all(axis=1)
-        if not are_nodes.all():
-            k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
-            must = f"a node of the grid, whole numbers ({inside})"
-            raise SettingError(f"path[{k}]", must, nodes[k].tolist())
+        k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
+        must = f"a node of the grid, whole numbers ({inside})"
+        demand(are_nodes.all(), f"path[{k}]", must, nodes[k].tolist())
         indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
         path = np.array([len(nodes), *indices], dtype=np.int32)
         made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
@@ -252,15 +243,11 @@ def trimmed(paths: grids.NodeArray) -> grids.NodeArray:
 
 @functools.lru_cache(maxsize=32)
 def _prepared(
-    collision: PotentialFields,
-    acceptance: Acceptance,
-    robot: FloorPlatform,
-    scenario: GridMotion,
+    collision: PotentialFields, acceptance: Acceptance, robot: FloorPlatform, scenario: GridMotion
 ) -> Problem:
     """Prepare a problem, kept for planners that differ in weights and rates alone."""
-    if robot.dimensions != len(scenario.size):
-        must = f"as many as the grid has ({len(scenario.size)})"
-        raise SettingError("robot.dimensions", must, robot.dimensions)
+    must = f"the dimensions of the grid ({len(scenario.size)})"
+    demand(robot.dimensions == len(scenario.size), "robot.dimensions", must, robot.dimensions)
     fields, margin = collision.bind(scenario.blocked()), scenario.security_margin
     bodies, between = scene(robot.build(), scenario.bodies()), "obstacles"
     if acceptance != "model":
@@ -274,10 +261,9 @@ def _prepared(
             must += f"({collision.max_unsafeness:g})"
             raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
     steps = fields.steps_to(goal)
-    if steps[start] == grids.UNREACHED:
-        must = f"a node that can be reached from the start {list(scenario.start)}; "
-        must += f"{between} are between"
-        raise SettingError("scenario.goal", must, list(scenario.goal))
+    must = f"a node that can be reached from the start {list(scenario.start)}; "
+    must += f"{between} are between"
+    demand(steps[start] != grids.UNREACHED, "scenario.goal", must, list(scenario.goal))
     world = World(
         own.neighbours,
         fields.num_moves,

@@ -10,13 +10,13 @@ flat: θ1, θ2 [deg].
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.evolution.succession import choose_parents, summarise
 from evoexp.numeric.compilation import borrowed, kernel
@@ -163,10 +163,7 @@ def flip_strings(draws: Uniforms, strings: IntArray, coding: Coding, count: int)
     u) / ln(1 − p)⌋ (Devroye 1986, section X.2); so a uniform number is taken per flipped bit.
     """
     bits, num = coding.bits, len(strings) * coding.bits
-    staying, place = (
-        log(1.0 - coding.mutation_rate),
-        -1,
-    )  # −inf: each is flipped
+    staying, place = log(1.0 - coding.mutation_rate), -1  # −inf: each is flipped
     while staying < 0.0:
         passed = log(1.0 - draw(draws)) / staying
         if not passed < num * count - 1 - place:
@@ -197,7 +194,6 @@ class Problem(NamedTuple):
 class PlacementGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 3.2."""
 
-    component: ClassVar[str] = "placement_ga"
     revision: ClassVar[int] = 2
 
     angle_range: Limits  # least and greatest θ1 and θ2 that genes stand for [deg]
@@ -209,19 +205,16 @@ class PlacementGa(PlannerDefaults, Component):
     # `model`: other planners may prove motions, here there are none
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _has_no_motion(self) -> Self:
+    def _check(self) -> None:
         must = "'model': the answer is a posture, there is no motion to prove"
         self.demand("acceptance", self.acceptance == "model", must)
-        return self
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
         """Build the robot and check that the end-effector can reach its target."""
         reach = sum(robot.link_lengths)
-        if abs(scenario.target[1]) > reach:
-            must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "
-            must += "(the links' lengths together)"
-            raise SettingError("scenario.target", must, list(scenario.target))
+        must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} "
+        must += "(the links' lengths together)"
+        demand(abs(scenario.target[1]) <= reach, "scenario.target", must, list(scenario.target))
         task = Task(*robot.link_lengths, *scenario.target, *scenario.force)
         avoided = self.objective.avoided(scenario.obstacle_points())
         model = Model(task, self.objective.weights, avoided, robot.limits)

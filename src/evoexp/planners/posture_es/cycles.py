@@ -1,14 +1,12 @@
 """The evolution strategy on postures, cycle by cycle (Corsépius 2001, section 4.2)."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
 
 from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part
-from evoexp.evolution.succession import cost_statistics
 from evoexp.numeric.elementary import standard_normal
 from evoexp.objectives.posture_cost import COLUMNS
 from evoexp.paths.motion import Motion
@@ -48,12 +46,10 @@ class StrategySettings(Component):
     parent_std: Positive  # of Gaussian parent choice, in units of μ [-]
     crossover_rate: Rate  # probability that a child takes every joint from one of two parents
 
-    @model_validator(mode="after")
-    def _parents_fit(self) -> Self:
+    def _check(self) -> None:
         fits = self.num_parents <= self.num_offspring + self.num_immigrants
         must = f"at most num_offspring ({self.num_offspring}) with comma selection"
         self.demand("num_parents", fits or self.selection == "plus", must)
-        return self
 
     @property
     def population_size(self) -> int:
@@ -220,13 +216,12 @@ class Search:
         self._keeper.keep(self._least if last else np.inf, best)
         costs, count = self._costs, self._offspring.shape[1]
         return self._keeper.record(
-            cost_statistics(self._usable),
-            costs[None, :] if num_phases > 1 else costs,
+            self._usable,
             self._offspring,
-            lowest=float(costs.min()) if last else np.inf,
-            num_feasible=int(np.count_nonzero(np.isfinite(self._usable))),
+            count * (1 + (self._planner.edge_check if self._cycles else 0)),
             evaluations=count,
-            collision_queries=count * (1 + (self._planner.edge_check if self._cycles else 0)),
+            costs=costs[None, None] if num_phases > 1 else costs[None],
+            lowest=[float(costs.min()) if last else np.inf],
             stop_reason=reason if last or reason != "goal" else "",
         )
 

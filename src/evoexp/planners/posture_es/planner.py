@@ -46,7 +46,6 @@ DENSE = 50  # configurations per step at which tilts of the continuous motion ar
 class PostureEs(PlannerDefaults, Component):
     """The evolution strategy of Corsépius, section 4."""
 
-    component: ClassVar[str] = "posture_es"
     goal_is_region: ClassVar[bool] = True
 
     # how far a joint may step at most: one number for all joints, or one per joint [rad],

@@ -101,7 +101,7 @@ def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
     if goal is None and problem.first_stage.judge(start).feasible[0]:
         return problem
     ends = [problem.start] if goal is None else [problem.start, goal]
-    free = [q for q in ends if _distances(problem, q).min(initial=np.inf) > 0.0]
+    free = [q for q in ends if problem.scene.distances(q).min(initial=np.inf) > 0.0]
     if free:
         table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
         bodies = problem.bodies.fitted(table, ignored, np.column_stack(free))
@@ -110,20 +110,12 @@ def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
     if not judged.feasible[0]:
         must = "within the hard limits of upright and keep_parallel"
         if judged.rows[COLLISION, 0] != 0.0:
-            distances = _distances(problem, problem.start)
+            distances = problem.scene.distances(problem.start)
             one, two = problem.scene.pair_names(int(np.argmin(distances)))
             depth = f"{max(-float(distances.min()), 0.0):.3g} {problem.task.length_unit}"
             must = f"free of collision ({one} and {two} overlap by {depth})"
         raise SettingError("scenario.q_start", must, list(problem.task.q_start))
     return problem
-
-
-def _distances(problem: Problem, q: FloatArray) -> FloatArray:
-    """Return the distances of the exact bodies, pair by pair, at posture q (nq,)."""
-    scene = problem.scene
-    placements = scene.geometry.createData()
-    pin.computeDistances(scene.model, scene.model.createData(), scene.geometry, placements, q)
-    return np.array([result.min_distance for result in placements.distanceResults])
 
 
 @functools.lru_cache(maxsize=16)

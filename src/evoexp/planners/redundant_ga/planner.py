@@ -46,8 +46,6 @@ CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellip
 class Reaching(Component):
     """Weights of Eq. 4 without its collisions: position error and turning."""
 
-    component: ClassVar[str] = "reaching"
-
     position_weight: NonNegative  # w1, of the distance between tip and target [1/length unit]
     displacement_weight: NonNegative  # w2, of the Euclidean distance between the postures [1/rad]
 
@@ -60,20 +58,19 @@ class Reaching(Component):
 class RedundantGa(PlannerDefaults, Component):
     """The algorithm of Lavoie & Boudreau, sections 3 to 5."""
 
-    component: ClassVar[str] = "redundant_ga"
     goal_is_region: ClassVar[bool] = True
 
     num_attempts: Count  # how often SP1 and SP2 are searched at most
     stop_cost_sp1: Positive  # the search of SP1 ends where the objective is smaller
-    stop_cost_sp2: Positive  # the same of SP2
+    stop_cost_sp2: Positive  # the search of SP2 ends where the objective is smaller
     # A sub-path is successful below its stopping cost (`threshold`), or if its cost is
     # `finite`
     success: Literal["threshold", "finite"]
     ga: sub_path.SelectiveSettings  # population, generations, operators
     objective: Reaching  # weights of Eq. 4
     collision: LinkEllipses  # positions and chords that are tested
-    # which ends of sub-paths may be the best one: those that the model accepts, or those of
-    # them whose sub-path the exact certifier proves; one that is refuted costs inf
+    # which ends of sub-paths may be the best one: all that the model accepts, or only ends
+    # whose sub-path the exact certifier also proves; a refuted end costs inf
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
@@ -191,8 +188,6 @@ class SequentialSearch(WrappedPlanner):
     search draws both sub-paths at once and must succeed in both with one draw.)
     """
 
-    component: ClassVar[str] = "sequential_search"
-
     search: ClassVar[type[sub_path.DrawnSearch]] = sub_path.DrawnSearch
 
     planner: RedundantGa  # the planner whose loop, sampling and budget are used
@@ -256,7 +251,6 @@ class InverseKinematics(SequentialSearch):
     pseudoinverse method (section 6); damped least squares of Nakamura & Hanafusa 1986 stand for it.
     """
 
-    component: ClassVar[str] = "inverse_kinematics"
     search: ClassVar[type[sub_path.DrawnSearch]] = DescendingSearch
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Any:

@@ -4,7 +4,7 @@ Lavoie & Boudreau 2001; their hyperparameters, and operators that can be chosen.
 """
 
 from collections.abc import Generator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
@@ -41,7 +41,7 @@ STRETCH = 8  # generations computed per call, at most,
 MEMORY = 2**20  # [B] whose tables should not take more than this
 
 
-class SelectiveSettings(PopulationSettings):
+class SelectiveSettings(PopulationSettings, is_base=True):
     """Settings of real and of binary coding; `RealGenetic` and `BinaryGenetic` add their own.
 
     An operator is another component, or one of these words; its settings are then those below.
@@ -66,8 +66,6 @@ class SelectiveSettings(PopulationSettings):
 
 class RealGenetic(SelectiveSettings):
     """Genomes of real numbers within limits."""
-
-    component: ClassVar[str] = "real_genetic"
 
     # of a pair, with probability `crossover_rate`
     crossover: Literal["one_point", "uniform", "arithmetic", "blx_alpha"] | Named[Crossover]
@@ -108,8 +106,6 @@ class BinaryGenetic(SelectiveSettings):
     One-point crossover between bits, mutation bit by bit.
     """
 
-    component: ClassVar[str] = "binary_genetic"
-
     # B; a gene takes 2^B values, its limits included [-]
     bits_per_gene: Annotated[int, Field(ge=1, le=52)]
 
@@ -138,7 +134,6 @@ class Search(GeneticSearch):
     end: BestEnd  # of the present search
 
     def __init__(self, planner: "RedundantGa", problem: Problem, rng: np.random.Generator) -> None:
-        """Take memory."""
         ga, limits = planner.ga, problem.joint_limits
         assert isinstance(ga, RealGenetic | BinaryGenetic), "prepare refuses others"
         size, bits = ga.population_size, ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 0

@@ -27,6 +27,14 @@ class Trees(NamedTuple):
     counts: IntArray  # (2,) number of nodes
 
 
+class FreeSpace(NamedTuple):
+    """A collision model as kernels ask it, and how densely edges are tested."""
+
+    num_free: Any  # kernel: how many of a batch are free before the first eight that are not
+    tables: Any  # its first argument
+    resolution: float  # greatest distance of configurations that are tested [deg]
+
+
 @kernel
 def nearest_node(nodes: FloatArray, count: int, q: FloatArray) -> int:
     """Return the node (a column of nodes (nq, room)) nearest to q, the first among equals."""
@@ -95,28 +103,19 @@ def tested_configurations(one: FloatArray, two: FloatArray, resolution: float) -
 
 
 @kernel
-def edge_is_free(
-    num_free: Any, tables: Any, one: FloatArray, two: FloatArray, resolution: float
-) -> tuple[bool, int]:
+def edge_is_free(space: FreeSpace, one: FloatArray, two: FloatArray) -> tuple[bool, int]:
     """Return whether an edge is free where it is tested, and how many configurations were asked.
 
     They are asked for eight at a time, up to the first contact; its first end is known to be free.
     """
-    q = DEGREE * tested_configurations(one, two, resolution)
-    free = num_free(tables, q)
+    q = DEGREE * tested_configurations(one, two, space.resolution)
+    free = space.num_free(space.tables, q)
     return free == q.shape[1], min(q.shape[1], free + LANES)
 
 
 @kernel
 def _extended(
-    num_free: Any,
-    tables: Any,
-    trees: Trees,
-    tree: int,
-    near: int,
-    target: FloatArray,
-    step: float,
-    resolution: float,
+    space: FreeSpace, trees: Trees, tree: int, near: int, target: FloatArray, step: float
 ) -> tuple[Trees, int, int, int]:
     """EXTEND (Fig. 2) from a given node.
 
@@ -128,7 +127,7 @@ def _extended(
     outcome = REACHED if (new == target).all() else ADVANCED
     if (new == q).all():  # nothing between them
         return trees, near, outcome if outcome == REACHED else TRAPPED, 0
-    is_free, asked = edge_is_free(num_free, tables, q, new, resolution)
+    is_free, asked = edge_is_free(space, q, new)
     if not is_free:
         return trees, near, TRAPPED, asked
     index, room = trees.counts[tree], trees.parents.shape[1]
@@ -144,13 +143,7 @@ def _extended(
 
 @kernel
 def grow(
-    num_free: Any,
-    tables: Any,
-    trees: Trees,
-    tree: int,
-    target: FloatArray,
-    step: float,
-    resolution: float,
+    space: FreeSpace, trees: Trees, tree: int, target: FloatArray, step: float
 ) -> tuple[Trees, int, int, int]:
     """Let one tree step toward a configuration, and the other connect to its end (Fig. 5).
 
@@ -159,17 +152,13 @@ def grow(
     latter; and how many configurations were asked for.
     """
     near = nearest_node(trees.nodes[tree], trees.counts[tree], target)
-    trees, end, outcome, asked = _extended(
-        num_free, tables, trees, tree, near, target, step, resolution
-    )
+    trees, end, outcome, asked = _extended(space, trees, tree, near, target, step)
     if outcome == TRAPPED:
         return trees, end, -1, asked
     other, new = 1 - tree, trees.nodes[tree, :, end].copy()
     met, outcome = nearest_node(trees.nodes[other], trees.counts[other], new), ADVANCED
     while outcome == ADVANCED:  # CONNECT
-        trees, met, outcome, more = _extended(
-            num_free, tables, trees, other, met, new, step, resolution
-        )
+        trees, met, outcome, more = _extended(space, trees, other, met, new, step)
         asked += more
     return trees, end, met if outcome == REACHED else -1, asked
 
@@ -208,7 +197,7 @@ def place_on_path(
 
 @kernel
 def shortcuts(
-    num_free: Any, tables: Any, path: FloatArray, ends: FloatArray, resolution: float
+    space: FreeSpace, path: FloatArray, ends: FloatArray
 ) -> tuple[FloatArray, IntArray, FloatArray, int]:
     """Try straight lines between places of a path (nodes, nq), one after the other.
 
@@ -223,14 +212,14 @@ def shortcuts(
     for line in range(len(ends)):
         after[line] = lengths[-1]
         places = np.sort(ends[line] * lengths[-1])
-        first, one = place_on_path(path, lengths, places[0], resolution)
-        last, two = place_on_path(path, lengths, places[1], resolution)
+        first, one = place_on_path(path, lengths, places[0], space.resolution)
+        last, two = place_on_path(path, lengths, places[1], space.resolution)
         if first == last:  # the line between them is already part of the path
             continue
         new = _with_line(path, first, one, last, two)
         shorter = lengths_along(new)
         if shorter[-1] < lengths[-1]:
-            is_free, more = edge_is_free(num_free, tables, one, two, resolution)
+            is_free, more = edge_is_free(space, one, two)
             asked += more
             if is_free:
                 path, lengths, after[line] = new, shorter, shorter[-1]

@@ -14,7 +14,6 @@ from pydantic import Field
 from evoexp.collision.bodies.covered_bodies import CoveredBodies
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
-from evoexp.evolution.succession import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import Acceptance, Proofs, in_shape
@@ -39,7 +38,7 @@ class TreePaths(PlannerDefaults):
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
         """Refuse: trees are grown, paths are not drawn one by one."""
-        raise SettingError("planner", "one that draws paths one by one", self.component)
+        raise SettingError("planner", "a planner that draws paths one by one", self.component)
 
     def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
         """Return one path of a population (nq, nodes, individuals) as a flat solution."""
@@ -77,16 +76,8 @@ class TreePaths(PlannerDefaults):
             costs = costs if len(costs) else np.full(1, np.inf)
             best = search.candidate()  # may take the best path over
             keeper.keep(search.best_cost, best)
-            yield keeper.record(
-                cost_statistics(costs),
-                costs,
-                search.population,
-                lowest=float(costs.min()),
-                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
-                evaluations=len(costs),
-                collision_queries=search.edges.queries - asked,
-                stop_reason=search.stop_reason,
-            )
+            queries, reason = search.edges.queries - asked, search.stop_reason
+            yield keeper.record(costs, search.population, queries, stop_reason=reason)
             if search.stop_reason:
                 return
 
@@ -194,8 +185,6 @@ class NodePaths(TreePaths, ArmDefaults, Settings):
 
 class TreeGrowth(Component):
     """How much is searched per record, and in all."""
-
-    component: ClassVar[str] = "tree_growth"
 
     # iterations between two records: random configurations that the trees grow toward, and,
     # once there is a path, attempts to shorten it

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.planners.arm_tasks import ArmProblem, ArmTask
 from evoexp.planners.planner import Candidate, Reproducibility
 from evoexp.planners.sampling_based.kernels import distance
@@ -34,8 +34,6 @@ MOST_IDLE = 10_000  # iterations of OMPL without a query, after which it is done
 
 class QueryChunks(Component):
     """How long a planner of a library searches per record, and in all."""
-
-    component: ClassVar[str] = "query_chunks"
 
     # configurations that are asked for between two records; an edge that is being tested is
     # tested to its end
@@ -56,15 +54,13 @@ class OmplPlanner(NodePaths, Component):
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
         """Build the robot, and check start, goal and settings."""
-        if importlib.util.find_spec("ompl") is None:
-            must = "another planner: ompl needs pip install 'evoexp[baselines]'"
-            raise SettingError("planner", must, self.component)
+        must = "another planner: ompl needs pip install 'evoexp[baselines]'"
+        demand(importlib.util.find_spec("ompl") is not None, "planner", must, self.component)
         from ompl import geometric  # of its Python packages some have more algorithms than others
 
-        if not hasattr(geometric, self.algorithm):
-            must = "another algorithm: the OMPL that is installed has no "
-            must += f"{self.algorithm} in Python"
-            raise SettingError("planner.algorithm", must, self.algorithm)
+        must = "another algorithm: the OMPL that is installed has no "
+        must += f"{self.algorithm} in Python"
+        demand(hasattr(geometric, self.algorithm), "planner.algorithm", must, self.algorithm)
         for name in ("num_shortcuts", "num_smoothings"):
             if getattr(self, name) and self.algorithm not in DONE_WITH_A_PATH:
                 must = f"0: {self.algorithm} goes on to shorten its path by itself"

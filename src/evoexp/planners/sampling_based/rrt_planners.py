@@ -31,7 +31,6 @@ from evoexp.validation import Component, Count, NonNegativeCount, Positive
 class RrtConnect(node_paths.InIterations, node_paths.NodePaths, Component):
     """RRT-Connect and shortcuts; the population is all nodes of both trees."""
 
-    component: ClassVar[str] = "rrt_connect"
     revision: ClassVar[int] = 3
 
     # how often both trees are grown anew once a path is shortened or given up; the shortest
@@ -133,7 +132,6 @@ class RrtReaching(node_paths.InIterations, Component):
     iterations that complete no plan cost inf.
     """
 
-    component: ClassVar[str] = "rrt_reaching"
     revision: ClassVar[int] = 2
     unit: ClassVar[float] = 1.0
 

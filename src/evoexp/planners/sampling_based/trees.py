@@ -28,14 +28,13 @@ class EdgeTest:
         # judge the edges of paths that the model calls free; None: the model is trusted
         proofs: Proofs | None = None,
     ) -> None:
-        """Begin with no query."""
-        self._collision, self.resolution, self.queries = collision, resolution, 0
-        self.test, self._proofs = collision.free_test, proofs  # a kernel and its tables; proofs
+        self._collision, self._proofs, self.queries = collision, proofs, 0
+        self.space = kernels.FreeSpace(*collision.free_test, resolution)
         self._is_doubtful = False  # whether the last path was refuted
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
         """Whether an edge is free at the configurations tested; its first end is known to be."""
-        is_free, asked = kernels.edge_is_free(*self.test, one, two, self.resolution)
+        is_free, asked = kernels.edge_is_free(self.space, one, two)
         self.queries += asked
         return bool(is_free)
 
@@ -66,8 +65,8 @@ class EdgeTest:
 
     def num_contacts(self, path: FloatArray) -> int:
         """Return how many of the configurations tested on a path (nodes, nq) collide."""
-        edges = itertools.pairwise(path)
-        tested = [kernels.tested_configurations(one, two, self.resolution) for one, two in edges]
+        edges, resolution = itertools.pairwise(path), self.space.resolution
+        tested = [kernels.tested_configurations(one, two, resolution) for one, two in edges]
         if not tested:
             return 0
         q = np.concatenate(tested, axis=1)
@@ -101,9 +100,8 @@ class TreePair:
         turn = self.num_iterations % 2
         self.num_iterations += 1
         edges = self._edges
-        self._trees, end, met, asked = kernels.grow(
-            *edges.test, self._trees, turn, target, self._step, edges.resolution
-        )
+        grown = kernels.grow(edges.space, self._trees, turn, target, self._step)
+        self._trees, end, met, asked = grown
         edges.queries += asked
         if met < 0:
             return None
@@ -182,9 +180,7 @@ class ShortenedPath:
     def attempt(self, uniforms: FloatArray) -> FloatArray:
         """Try lines between shares (attempts, 2) of the path; return its length after each."""
         edges = self._edges
-        nodes, sizes, after, asked = kernels.shortcuts(
-            *edges.test, self.nodes, uniforms, edges.resolution
-        )
+        nodes, sizes, after, asked = kernels.shortcuts(edges.space, self.nodes, uniforms)
         edges.queries += asked
         for path in np.split(nodes, np.cumsum(sizes)[:-1]) if len(sizes) else []:
             self._before.append(self.nodes)

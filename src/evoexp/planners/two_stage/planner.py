@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, NoReturn
 import numpy as np
 
 from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, demand
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import Acceptance, Proofs
@@ -47,20 +47,17 @@ class Problem(NamedTuple):
 class TwoStage(PlannerDefaults, Component):
     """The placement search, then the path search."""
 
-    component: ClassVar[str] = "two_stage"
-
     placement: PlacementGa  # the planner of the first stage
     path: GridPathGa  # the planner of the second one
-    # which missions are an answer: those that both stages accept (`model`), or those of them
-    # whose whole motion, driving and docking, the exact certifier proves (`certified`,
-    # `margin`). Moves over the grid that it refutes are forbidden then
+    # which missions are an answer: all that both stages accept (`model`), or only missions
+    # whose whole motion, driving and docking, the exact certifier also proves (`certified`,
+    # `margin`). Refuted moves over the grid are then forbidden
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
         """Prepare both stages."""
-        if len(scenario.grid.size) != 2:
-            must = "of a floor, two numbers"
-            raise SettingError("scenario.grid.size", must, list(scenario.grid.size))
+        must = "two numbers, the size of a floor"
+        demand(len(scenario.grid.size) == 2, "scenario.grid.size", must, list(scenario.grid.size))
         placement = self.placement.prepare(robot.arm(), scenario.docking)
         path = self._driving.prepare(robot.platform(), scenario.grid)
         bodies = scene(robot.build(), scenario.grid.bodies(), self_pairs=True)

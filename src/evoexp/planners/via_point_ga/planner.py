@@ -10,10 +10,10 @@ arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
@@ -30,14 +30,7 @@ from evoexp.planners.via_point_ga.string_operators import NewTrajectories, Strin
 from evoexp.planners.via_point_ga.strings import Problem, Search, Strings, settle, smooth
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.validation import (
-    Component,
-    Count,
-    LayoutCount,
-    NonNegativeCount,
-    Positive,
-    Rate,
-)
+from evoexp.validation import Component, Count, LayoutCount, NonNegativeCount, Positive, Rate
 
 SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
@@ -46,7 +39,6 @@ SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between vi
 class ViaPointGa(ArmDefaults, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4 (Tables 1 and 3)."""
 
-    component: ClassVar[str] = "via_point_ga"
     is_real_coded: ClassVar[bool] = True
 
     num_via_points: LayoutCount  # N; instants 1 … N are judged, 0 is the start, N the goal
@@ -68,17 +60,15 @@ class ViaPointGa(ArmDefaults, Component):
     # site in every arm's path; `segment` exchanges what lies between the two sites of the
     # whole string: the end of the first path and the beginning of the second
     crossover_reading: Literal["tails", "segment"] = "tails"
-    # which motions are an answer: those that the collision model accepts at the instants it
-    # tests (`model`), those of them that the exact certifier proves free of contact between
-    # all instants (`certified`), or also free by the task's margins (`margin`). A string that
-    # is refuted counts as colliding at one instant more
+    # which motions are an answer: all that the collision model accepts at the instants it tests
+    # (`model`), or only motions that the exact certifier also proves free of contact between
+    # all instants (`certified`), or free by the task's margins (`margin`). A refuted string
+    # counts as colliding at one instant more
     acceptance: Acceptance = "model"
 
-    @model_validator(mode="after")
-    def _samples_halve(self) -> Self:
+    def _check(self) -> None:
         must = f"one of {', '.join(map(str, SAMPLES))}"
         self.demand("samples_per_segment", self.samples_per_segment in SAMPLES, must)
-        return self
 
     @property
     def operators(self) -> Operators:

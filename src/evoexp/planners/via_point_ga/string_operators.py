@@ -8,7 +8,7 @@
   of the string is exchanged.
 """
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -112,8 +112,6 @@ class StringCrossover(Crossover):
     are closer than a distance.
     """
 
-    component: ClassVar[str] = "string_crossover"
-
     crossover_distance: Positive  # Euclidean [deg]
     # whether the segment between the sites is exchanged, instead of the tails
     exchanges_segment: bool = False
@@ -170,8 +168,6 @@ class NewTrajectories(Mutation):
 
     They take distinct places, each with the rate as probability.
     """
-
-    component: ClassVar[str] = "new_trajectories"
 
     num_new_trajectories: NonNegativeCount  # offspring that may be replaced
     walk_step: Positive  # step of a new trajectory, in units of its straight distance over N

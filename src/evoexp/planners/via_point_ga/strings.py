@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from evoexp.planners.via_point_ga.planner import ViaPointGa
 
 LANES = 8  # individuals are padded to whole vectors
-PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
-CACHED = 1 << 19  # [B] and as many as take so much memory
+PER_CALL = 16  # generations that one call of a kernel computes at most,
+CACHED = 1 << 19  # [B] and the most memory that they may take
 
 
 class Settings(NamedTuple):
@@ -278,7 +278,6 @@ class Search(GeneticSearch):
     """One run, and memory for its generations."""
 
     def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
-        """Begin a run."""
         ga, strings = planner.ga, Strings(planner, problem)
         population, offspring = strings.empty(ga.population_size), strings.empty(ga.num_offspring)
         # testing covered bodies takes far longer than a call

@@ -142,7 +142,7 @@ def draw_scenes(table: pd.DataFrame) -> Figure:
         "goal": Patch(color=colour, alpha=0.35, label="goal"),
         "obstacle": Patch(color=OBSTACLE, alpha=0.4, label="obstacle"),
         "object": Patch(color=OBJECT, label="carried"),
-        "way": style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"),
+        "way": style.key("path of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"),
         "target": style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"),
     }
     there = set(table["element"])

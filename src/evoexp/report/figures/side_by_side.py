@@ -161,7 +161,7 @@ def shares_table(
     printed: Mapping[str, float],
     confidence: float,
 ) -> Rows:
-    """Return shares of runs with Wilson's intervals, and those that a paper prints, by quantity.
+    """Return shares of runs with Wilson's intervals, and the printed shares, by quantity.
 
     The rows are (quantity, position, condition, how many).
     """

@@ -102,7 +102,7 @@ def drawn(
 
 
 def _style_file(path: str) -> dict[Any, Any]:
-    """Return the parameters that a matplotlib style file sets, but those that name files' ids."""
+    """Return the parameters that a matplotlib style file sets, but for ids of files."""
     logger, handler = logging.getLogger("matplotlib"), BufferingHandler(10_000)
     handler.setLevel(logging.WARNING)  # matplotlib logs what a style file has wrong
     logger.addHandler(handler)

@@ -44,10 +44,10 @@ class Request(NamedTuple):
     budget: str  # name of the budget; empty for runs given by their hashes
     conditions: Sequence[tuple[str, Condition]]  # (label, condition) in the order of the experiment
     settings: ReportSettings
-    num_replicates: int | None  # planned for every condition; None: as many as each one has
+    num_replicates: int | None  # planned for every condition; None: each one's own
     # What was asked for, as words of the command line: "rana_planar budget=smoke"; hashes if empty
     arguments: str = ""
-    # Label → the options that were taken; None: those that the runs' manifests name
+    # Label → the options that were taken; None: the options in the runs' manifests
     options: Mapping[str, tuple[Option, ...]] | None = None
     command: str = "report"  # that draws it
     searched: Searched | None = None  # the trials, if the conditions are those of a search

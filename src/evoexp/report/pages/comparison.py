@@ -178,7 +178,7 @@ def effort_text(queries: float) -> str:
 def compared_lengths(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare the planners of each problem, those that were run here."""
+    """Compare the planners of each problem that were run here."""
     rows = [
         compare(f"{a.label} – {b.label}", a.best_lengths, b.best_lengths, True, settings.confidence)
         for a, b in itertools.combinations([own for own in runs if own.condition is not None], 2)
@@ -204,7 +204,7 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
     """Return the answers as CSV, numbers with all digits, `inf` where there is no proven answer.
 
     Efforts are expected to a proven answer, in collision queries with their interval, in pairs of
-    shapes (body_queries), evaluations and CPU time; those that are not known are empty.
+    shapes (body_queries), evaluations and CPU time; unknown ones are empty.
     """
     answers = [
         (

@@ -153,7 +153,7 @@ def _outcomes(label: str, rows: Sequence[Comparison], significance: float) -> st
     words = {
         1: "is significantly better than",
         -1: "is significantly worse than",
-        0: "cannot be told from",
+        0: "does not differ significantly from",
     }
     parts = []
     for sign, word in words.items():
@@ -204,7 +204,7 @@ class Headline(NamedTuple):
 
 
 class Family(NamedTuple):
-    """A condition as assumed, and those that change its numbers."""
+    """A condition as assumed, and the conditions that change its numbers."""
 
     shipped: ConditionResults  # as assumed
     # Each other condition with the names of the settings that it changes
@@ -228,7 +228,7 @@ class Judged(NamedTuple):
 
 
 def families(read_results: Results) -> tuple[Family, ...]:
-    """Return the conditions as assumed, each with those that change its settings by overrides."""
+    """Return the conditions as assumed, each with the ones that override its settings."""
     changed = {
         c: tuple(
             p.name

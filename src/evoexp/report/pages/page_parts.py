@@ -55,7 +55,7 @@ def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity
 
 
 class Table(NamedTuple):
-    """A table, which is a section of a page by itself."""
+    """A table, which is a section of a page."""
 
     heading: str  # above it
     headers: tuple[str, ...]  # of its columns
@@ -145,7 +145,7 @@ class Document(NamedTuple):
     results: tuple[Table, ...]  # tables above the figures, without empty ones
     figures: tuple[Drawing, ...]
     appendix: tuple[Table, ...]  # tables below the figures
-    runs: tuple[ConditionResults, ...]  # those that it shows
+    runs: tuple[ConditionResults, ...]  # that it shows
     provenance: str = ""  # the sentence that tells them: how many, of which seeds and hashes
     formats: tuple[str, ...] = ()  # kinds of the figures' pictures
     players: Mapping[tuple[str, int], Player] = {}  # by the keys of the runs that figures play

@@ -81,7 +81,7 @@ def terms(results: Results) -> Iterator[Quantity]:
 def effect_rows(
     compared: tuple[comparisons.FamilyComparison, ...], names: Mapping[str, str]
 ) -> dict[str, tuple[comparisons.Comparison, ...]]:
-    """Return the comparisons of families by quantity: of all, or of those that have a name."""
+    """Return the comparisons of families by quantity: of all, or of the named ones."""
     rows = comparisons.rows_by_name(compared)
     return {shown: rows[name] for name, shown in names.items() if name in rows} if names else rows
 

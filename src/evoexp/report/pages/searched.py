@@ -27,7 +27,7 @@ class Trial(NamedTuple):
 
 
 class Searched(NamedTuple):
-    """What a search has found so far."""
+    """The trials of a search so far."""
 
     problems: tuple[str, ...]  # labels of the conditions that have the searched settings
     trials: tuple[Trial, ...]  # finished ones, trial 0 first
@@ -104,7 +104,7 @@ def best_trial(searched: Searched, trials: pd.DataFrame) -> Trial:
 
 def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) -> dict[str, object]:
     """Return the words of the page's texts."""
-    *others, last = (f"`{key}`" for key in searched.trials[-1].settings)
+    *others, last = [f"`{key}`" for key in searched.trials[-1].settings] or ["no setting"]
     rows = {row.trial: row for row in records(trials)}
     best, own = rows[best_trial.number], rows[0]
     return {
@@ -121,7 +121,7 @@ def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) ->
     }
 
 
-def best_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[object, ...]]:
+def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     """Yield a row for each of the best trials, and for the experiment as it is."""
     best = trials.sort_values("score", kind="stable").head(MOST_ROWS)
     for row in records(pd.concat([best, trials[:1]]).drop_duplicates("trial")):
@@ -135,7 +135,9 @@ def best_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[object
         )
 
 
-def problem_rows(best_trial: Trial, search_scores: pd.DataFrame) -> Iterator[tuple[object, ...]]:
+def best_trial_by_problem(
+    best_trial: Trial, search_scores: pd.DataFrame
+) -> Iterator[tuple[object, ...]]:
     """Yield a row per problem: the experiment as it is beside the best trial."""
     of_trial = search_scores["trial"]
     own, best = (search_scores[of_trial == number] for number in (0, best_trial.number))

@@ -42,7 +42,7 @@ class Answer(NamedTuple):
     replicate: int  # of the run
     generation: int  # in which it was found
     evaluations: int  # since the start
-    # Configurations judged since the start, those that the task tells of (`Planner.prior_queries`)
+    # Configurations judged since the start, the task's own (`Planner.prior_queries`)
     # included
     collision_queries: int
     length: float  # of the joints' path [rad, m]
@@ -56,8 +56,8 @@ class Answer(NamedTuple):
 def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
     """Return the answers of all finished replicates, by the labels of conditions.
 
-    Solutions of infinite cost, and those that are no motions, such as a posture that is held, have
-    no row. They are judged on all cores.
+    Solutions of infinite cost and solutions without motion, such as a posture that is held, have no
+    row. They are judged on all cores.
     """
     guests = {each.module.partition(".")[0] for each in registrations(COMPONENTS)}
     loaded = sorted(name for name in guests if name in sys.modules)
@@ -180,7 +180,7 @@ class PlannerRuns(NamedTuple):
     # Its answers in order; columns replicate, collision_queries, length and certified
     table: pd.DataFrame
     replicates: tuple[int, ...]  # (runs,) in order
-    # (runs,) collision queries of the whole runs, those that the task tells of included
+    # (runs,) collision queries of the whole runs, the task's own included
     spent: FloatArray
     # That was run; None: the runs were given, nobody here judged them
     condition: ConditionResults | None

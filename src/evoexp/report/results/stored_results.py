@@ -289,7 +289,7 @@ def _read(
         plans = tuple(run.plans())
     except DamagedFile as error:
         warn(f"{error}; added replicates are not marked")
-    if options is None:  # those that the manifest names; only shipped ones have files to be read
+    if options is None:  # the manifest's; only shipped ones have files to be read
         recorded: dict[str, dict[str, str]] = manifest.get("options") or {}
         options = tuple(
             Option(group, name, origin, str(folder / f"{name}.yaml") if origin == ORIGIN else "")

@@ -47,7 +47,7 @@ class Rule(NamedTuple):
     def about(self, words: dict[str, object] | None = None) -> "Rule":
         """Return the rule with its words in braces filled in, where no judge gives any with "…"."""
         limits: dict[str, object] = {name: f"{limit:g}" for name, limit in self.limits.items()}
-        unknown = collections.defaultdict[str, object](lambda: "…")
+        unknown = collections.defaultdict[str, object](lambda: "…", word="better")
         known = collections.ChainMap(limits, unknown if words is None else words)
         fields = ("claim", "source", "reproduced", "contradicted", "equal")
         return self._replace(**{name: getattr(self, name).format_map(known) for name in fields})

@@ -283,7 +283,7 @@ def best_known(group: Group) -> dict[str, object]:
     )
     cost, bound = cost_known(group.truth), path_claims.bound_known(group.truth)
     told, gap = f"no path is below {bound:.5g}", 100.0 * (cost / bound - 1.0)
-    within = f"no path costs less than {bound:.5g}: the truth is known within {gap:.1f} %"
+    within = f"no path costs less than {bound:.5g}: the optimum is known to within {gap:.1f} %"
     words: dict[str, object] = {"cost": cost, "length": length, "unsafeness": unsafeness}
     words |= {"nodes": len(best), "repeated": _repeated(best), "told": told, "within": within}
     return words | ({"told": "exact", "within": "exact"} if exact else {})

@@ -304,7 +304,7 @@ def draw_missions(table: pd.DataFrame) -> Figure:
         for _, corners in groups(rows[rows["kind"] == grid_paths.OBSTACLE], "number"):
             grid_paths.draw_obstacle(above, corners["a"], corners["b"])
         path = rows.loc[rows["kind"] == WAY, ["a", "b"]].to_numpy()
-        above.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
+        above.plot(*path.T, color=style.CONDITION_COLOURS[0], label="path of the platform")
         above.plot(*path[0], "o", markersize=4, **MARKED)
         above.plot(*path[-1], "*", markersize=8, label="docking place", **MARKED)
         style.operational_axes(above, unit)

@@ -23,7 +23,7 @@ WRONG, MISSING, SURPLUS = "wrong", "missing", "surplus"
 MARKED_SLIPS = {
     WRONG: "another number is printed (below, small)",
     MISSING: "nothing is printed for the node",
-    SURPLUS: "a token too many is printed here",
+    SURPLUS: "a surplus token is printed here",
 }
 FRAMES: dict[str, dict[str, Any]] = {
     slip: {"fill": False, "edgecolor": colour, "linewidth": 1.4}
@@ -38,7 +38,7 @@ PLACE = "row {0.row} from the top, column {0.column}"
 SLIPS = {
     WRONG: PLACE + ": {0.printed} for {0.computed}",
     MISSING: PLACE + ": {0.computed} is left out",
-    SURPLUS: PLACE + ": a {0.printed} too many before it",
+    SURPLUS: PLACE + ": a surplus {0.printed} before it",
 }
 
 

@@ -1,5 +1,6 @@
-"""Paths of postures in space, local search scope (Corsépius 2001, Fig. 2), a local minimum."""
+"""Robots and their covers, paths of postures, search scope, a local minimum (Corsépius 2001)."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,10 @@ from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
 from evoexp.papers.corsepius import measures
-from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.measures import Conditions, ShownPath
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import median_replicate, solved
 from evoexp.report.results.stored_results import ConditionResults
@@ -40,6 +40,8 @@ AROUND = 3.0  # [scopes] the landscape reaches from the posture that is stuck
 BOXES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 SAMPLES = 20_000  # postures in each box
 STUCK, HELPED = "stuck", "helped"
+BODY, COVER = "body", "cover"
+KINDS = {"sphere": "spheres", "capsule": "capsules"}
 END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
 
 
@@ -56,7 +58,7 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
             given = {"panel": len(panels), "title": title, "length_unit": unit}
             panels.append([given | row for row in _panel(problem, span, postures, first)])
     rows = [row for panel in panels for row in panel]
-    names = ["panel", "title", "element", "instant", "name", *solids.COLUMNS, *PATH, "length_unit"]
+    names = ["panel", "title", "element", "instant", "name", *trails.COLUMNS, *PATH, "length_unit"]
     return rounded(pd.DataFrame(rows).reindex(columns=names))
 
 
@@ -79,7 +81,7 @@ def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
     goal = style.key("goal", color="none", marker="*", mec=style.NEUTRAL, mfc="white", ms=9)
-    tool = style.key("way of the tool", color=style.arm_colour(1), linewidth=1.0)
+    tool = style.key("path of the tool", color=style.arm_colour(1), linewidth=1.0)
     style.keys_below(figure, [*trails.trail_keys([])[:-1], tool, goal])
     return figure
 
@@ -113,7 +115,7 @@ def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> li
                 grasp, posture = span.stage.situation.grasp, postures[instant]
                 pose = frame_pose(problem.assembly.table, problem.tool[0], grasp, posture)
                 placement = pin.SE3(pose[:9].reshape(3, 3), pose[9:])
-            found, element = solids.solid(shape, placement), HELD if held else OBSTACLE
+            found, element = trails.solid(shape, placement), HELD if held else OBSTACLE
             rows += [_row(element, instant, name) | found] if found else []
     return rows
 
@@ -125,16 +127,16 @@ def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any
 
 def _points(rows: pd.DataFrame) -> FloatArray:
     links, goal, *solid = (rows[rows["element"] == e] for e in (LINK, GOAL, OBSTACLE, HELD))
-    return np.vstack([links[PLACE], links[PATH], goal[PLACE], *map(solids.corners, solid)])
+    return np.vstack([links[PLACE], links[PATH], goal[PLACE], *map(trails.corners, solid)])
 
 
 def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     """Draw a panel into axes in space (names xyz) or in the plane (xy)."""
     last = rows.loc[rows["element"] == LINK, "instant"].max()
     for row in records(rows[rows["element"] == OBSTACLE]):
-        solids.draw_solid(axes, row, style.FAINT, 0.22)
+        trails.draw_solid(axes, row, style.FAINT, 0.22)
     for row in records(rows[rows["element"] == HELD]):  # earlier fainter
-        solids.draw_solid(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
+        trails.draw_solid(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
     trails.draw_trail(axes, rows[rows["element"] == LINK], style.arm_colour(0), names)
     # the tool's way and its goal
     way, goal = (rows[rows["element"] == element] for element in (TIP, GOAL))
@@ -187,7 +189,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
         colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
         look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
         right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **look)
-    right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="way of the tool")
+    right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="path of the tool")
     _draw_ends(right, tool)
     style.operational_axes(right, table["length_unit"].iloc[0])
     right.set(title="b  the tool, one step from the start", **EQUAL)
@@ -251,9 +253,9 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     goal = dict(zip("xyz", stage.target_position, strict=True))
     rows.append({"element": GOAL, "order": 0} | goal)
     shapes = obstacle_shapes(problem.placed_obstacles(situation))
-    standing = [solids.solid(*shape) for shape in shapes]
+    standing = [trails.solid(*shape) for shape in shapes]
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
-    names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS]
+    names = ["element", "series", "replicate", "order", "value", *trails.COLUMNS]
     table = rounded(pd.DataFrame(rows).reindex(columns=[*names, "x_end", "y_end", "scope_deg"]))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.length_unit)
 
@@ -281,7 +283,7 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     # ways of both kinds of runs, crosses where they are stuck
     for row in records(obstacles):
-        solids.draw_solid(above, row, style.FAINT, 0.35)
+        trails.draw_solid(above, row, style.FAINT, 0.35)
     looks = {
         STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
         HELPED: (style.arm_colour(0), "with a sub-goal"),
@@ -322,4 +324,53 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     escape.set(ylim=(0.0, None), title="d  random postures around it")
     keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
     style.keys_below(figure, keys)
+    return figure
+
+
+def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
+    """Return bodies and covers of robots at their start, of (title, a condition of the robot)."""
+    rows: list[tuple[Any, ...]] = []
+    for position, (title, c) in enumerate(shown):
+        problem = c.problem(Problem)
+        bodies, model, geometry = problem.bodies, problem.assembly.model, problem.assembly.geometry
+        data, placements = model.createData(), geometry.createData()
+        pin.updateGeometryPlacements(model, data, geometry, placements, problem.start)
+        own = [
+            (BODY, item.name, *trails.solid(item.geometry, place).values())
+            for item, place in zip(geometry.geometryObjects, placements.oMg, strict=True)
+        ]
+        joints = (data.oMi[item.parentJoint] for item in geometry.geometryObjects)
+        for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
+            for start, end, radius in zip(cover.start, cover.end, cover.radius, strict=True):
+                pose, length = motion_scenes.capsule(start, end)
+                middle, turn = joint.act(pose.translation), (joint.rotation @ pose.rotation).ravel()
+                sizes = radius, 0.5 * length, 0.0
+                kind = "capsule" if length else "sphere"
+                own.append((COVER, name, kind, *middle, *turn, *sizes))
+        rows += [(position, title, *row, bodies.inflation, c.length_unit) for row in own]
+    names = ["position", "robot", "element", "name", *trails.COLUMNS, "inflation", "length_unit"]
+    return rounded(pd.DataFrame(rows, columns=names))
+
+
+def draw_models(table: pd.DataFrame) -> Figure:
+    """Draw one row per robot: its bodies, and their covers."""
+    robots = list(groups(table, ["position", "robot"]))
+    spans = [np.ptp(trails.corners(rows), axis=0) for _, rows in robots]
+    heights = [float(np.clip(2.0 + 1.6 * z / max(x, y), 2.3, 3.3)) for x, y, z in spans]  # [inch]
+    figure = style.figure(sum(heights))
+    grid = figure.add_gridspec(len(robots), 2, height_ratios=heights)
+    for (position, robot), rows in robots:
+        points, (inflation, unit) = trails.corners(rows), rows[["inflation", "length_unit"]].iloc[0]
+        bodies, covers = (rows[rows["element"] == element] for element in (BODY, COVER))
+        counts = covers["shape"].value_counts()
+        kinds = ", ".join(f"{counts[kind]} {KINDS[kind]}" for kind in KINDS if kind in counts)
+        shown = (
+            (bodies, 0.85, f"{robot}: {len(bodies)} bodies"),
+            (covers, 0.35, f"{kinds}, at most {inflation:.3g} {unit} beyond"),
+        )
+        for k, (own, alpha, title) in enumerate(shown):
+            axes = trails.space(figure, (grid[position, k],), points, unit)
+            for row in records(own):
+                trails.draw_solid(axes, row, style.arm_colour(k), alpha)
+            axes.set_title(title)
     return figure

@@ -2,7 +2,7 @@
 
 An individual is a path: via-points at equal times from start to goal, with straight lines between
 them. The best path so far is kept; every generation displaces all its via-points at random, λ
-times, and the best of these paths takes its place if it is better.
+times, and the best of these paths replaces it if it is better.
 
 A population is an array (nq, instants, individuals) [deg], the start and the goal among the
 instants. A solution is flat: instant by instant, joint by joint (instants × nq) [deg].

@@ -1,7 +1,7 @@
-"""Controls that search among a real-coded planner's individuals as vectors, at its own cost.
+"""Controls: at random, many starts, and searches among individuals as real vectors.
 
-CMA-ES (Hansen & Ostermeier 2001) by the package cmaes, NSGA-II (Deb et al. 2002) by pymoo,
-stochastic trajectory optimisation in the manner of STOMP, and iterated local search.
+They search at a planner's own cost: CMA-ES (Hansen & Ostermeier 2001) by the package cmaes, NSGA-II
+(Deb et al. 2002) by pymoo, trajectory optimisation in the manner of STOMP, iterated local search.
 """
 
 import itertools
@@ -12,15 +12,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import SettingError, demand, nearest
 from evoexp.numeric.elementary import exp, matrix_product, standard_normal
-from evoexp.planners.planner import (
-    COPIES,
-    Populations,
-    Reproducibility,
-    WrappedPlanner,
-    num_values,
-)
+from evoexp.planners.planner import COPIES, Populations, Reproducibility, WrappedPlanner, num_values
 from evoexp.records import BoolArray, FloatArray
 from evoexp.validation import Count, Positive, Rate
 
@@ -28,6 +22,54 @@ SHRINKAGE = 0.1  # [-] share of a drawn covariance that is replaced by its diago
 LEAST = 1e-6  # [-] of the mean variance: directions in which drawn individuals do not differ
 SEEDS = 2**32  # of numpy's older generators
 ENDLESS = 10**9  # generations: NSGA-II counts them itself
+
+
+class RandomSearch(WrappedPlanner):
+    """Draws individuals as the wrapped planner draws its first ones, as many as it evaluates."""
+
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
+        """Yield one generation of new samples after the other."""
+        for index in itertools.count():
+            yield self.planner.sample(problem, rng, self.planner.num_evaluations(index))
+
+
+class MultiStart(WrappedPlanner):
+    """Draws a population, applies the planner's local operator again and again, and starts anew.
+
+    The first generation of a start holds fresh samples; each of the next `num_sweeps` generations
+    the same individuals after one more pass of the planner's `improve`. A generation evaluates as
+    many as the planner would in it: where that falls, the last are left out; where it rises, fresh
+    samples join.
+    """
+
+    num_sweeps: Count  # passes of the local operator per start
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem."""
+        problem = super().prepare(robot, scenario)
+        rng = np.random.Generator(np.random.PCG64(0))  # of a trial whose result is thrown away
+        sample = self.planner.sample(problem, rng, 1)
+        if self.planner.improve(problem, sample, rng) is None:
+            must = f"left out: {self.planner.component} has no local operator to be repeated"
+            raise SettingError("control", must, self.component)
+        return problem
+
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
+        """Yield one start after the other: fresh samples, then their sweeps."""
+        planner, population = self.planner, np.empty(0)
+        for index in itertools.count():
+            count, improved = planner.num_evaluations(index), None
+            if index % (self.num_sweeps + 1):
+                improved = planner.improve(problem, population[..., :count], rng)
+                missing = count - population.shape[-1]
+            if improved is None:
+                population = planner.sample(problem, rng, count)
+            elif missing > 0:
+                fresh = planner.sample(problem, rng, missing)
+                population = np.concatenate([improved, fresh], axis=-1)
+            else:
+                population = improved
+            yield population
 
 
 class RealVectors(NamedTuple):
@@ -70,7 +112,7 @@ class Distribution(NamedTuple):
     deviation: float  # root of the mean variance
 
 
-class RealVectorControl(WrappedPlanner):
+class RealVectorControl(WrappedPlanner, is_base=True):
     """Base of the controls that search among the real vectors of a planner's individuals."""
 
     matrices: ClassVar[int] = 1  # of (variables, variables) that a search keeps
@@ -80,10 +122,9 @@ class RealVectorControl(WrappedPlanner):
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""
-        if not self.planner.is_real_coded:
-            of = self.planner.component
-            must = f"left out: individuals of {of} are no vectors of real numbers"
-            raise SettingError("control", must, self.component)
+        of = self.planner.component
+        must = f"left out: individuals of {of} are no vectors of real numbers"
+        demand(self.planner.is_real_coded, "control", must, self.component)
         return super().prepare(robot, scenario)
 
     def num_evaluations(self, index: int) -> int:
@@ -105,9 +146,8 @@ def real_vectors(planner: Any, problem: Any, drawn: FloatArray) -> RealVectors:
     template = np.ascontiguousarray(drawn[..., 0])
     changes = np.asarray((drawn != template[..., None]).any(axis=-1))
     vectors = np.ascontiguousarray(drawn[changes])  # (variables, individuals)
-    if not vectors.size:
-        must = "one whose first individuals differ"
-        raise SettingError("planner", must, planner.component)
+    must = "one whose first individuals differ"
+    demand(vectors.size, "planner", must, planner.component)
     bounds = planner.bounds(problem)  # real-coded ones have them
     return RealVectors(template, changes, vectors, bounds)
 
@@ -125,14 +165,13 @@ def transposed_root(matrix: FloatArray) -> FloatArray:
 class CmaEs(RealVectorControl):
     """Adapts mean and covariance of a normal distribution of individuals to what costs least.
 
-    It begins with those of individuals drawn as the planner draws its own first ones. With
+    It begins with individuals drawn as the planner draws its own first ones. With
     `improves` each individual goes through one pass of the planner's local operator before it is
     judged; what is told to CMA-ES is the vector before it. Where all steps have become too small to
-    matter, or numbers leave those that can be judged, it starts anew. Linear algebra makes the last
-    bits those of an environment.
+    matter, or numbers become too large to be judged, it starts anew. Linear algebra makes the last
+    bits depend on the environment.
     """
 
-    component: ClassVar[str] = "cma_es"
     reproducibility: ClassVar[Reproducibility] = "environment"
     matrices: ClassVar[int] = 12  # the covariance, its parts, and those of an update
 
@@ -176,7 +215,6 @@ class IteratedLocalSearch(RealVectorControl):
     cheapest of its trials in a generation unless that costs more. Chains exchange nothing.
     """
 
-    component: ClassVar[str] = "iterated_local_search"
     matrices: ClassVar[int] = 0
 
     num_chains: Count  # individuals that are improved side by side
@@ -220,7 +258,6 @@ class Nsga2(RealVectorControl):
     first. Linear algebra of libraries makes the last bits those of an environment.
     """
 
-    component: ClassVar[str] = "nsga2"
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     fewest: ClassVar[int] = 4
@@ -280,7 +317,6 @@ class Stomp(RealVectorControl):
     `patience` generations the search starts anew from an individual that the planner draws.
     """
 
-    component: ClassVar[str] = "stomp"
     matrices: ClassVar[int] = 4  # the covariance, its root, and those of its factorisation
 
     sigma: Positive  # standard deviation of the first noise, in those of the drawn individuals [-]

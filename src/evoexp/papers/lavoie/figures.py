@@ -1,6 +1,6 @@
 """Figures of Lavoie & Boudreau 2001: motions (Figs. 1, 2), errors below x (Fig. 3), stopping."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -115,7 +115,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
+def _postures(one: ShownMotion) -> Rows:
     """Yield the links at the start, at tested positions of both sub-paths, and where they touch."""
     c = one.condition
     if one.replicate is None:
@@ -132,16 +132,13 @@ def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
         yield from _links(one, TOUCHING, np.array([instant]), motion.at(instant)[:, None])
 
 
-def _links(
-    one: ShownMotion, element: str, instants: FloatArray, q: FloatArray
-) -> list[tuple[Any, ...]]:
-    """Return the links at some instants, q (nq, instants) [rad]."""
+def _links(one: ShownMotion, element: str, instants: FloatArray, q: FloatArray) -> Rows:
+    """Yield the links at some instants, q (nq, instants) [rad]."""
     assembly = one.condition.problem(Problem).assembly
-    return [
-        (element, "arm", int(np.ceil(t)), t, link, *start[k, :2], *end[k, :2], *NO_SIZE)
-        for _, link, start, end in motion_geometry.joint_positions(assembly, q / DEGREE)
-        for k, t in enumerate(instants)
-    ]
+    for _, link, start, end in motion_geometry.joint_positions(assembly, q / DEGREE):
+        for k, t in enumerate(instants):
+            ends = *start[k, :2], *end[k, :2]
+            yield element, "arm", int(np.ceil(t)), t, link, *ends, *NO_SIZE
 
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:

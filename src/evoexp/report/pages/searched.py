@@ -4,7 +4,7 @@ A trial is an experiment with some settings changed. Trial 0 is the experiment a
 other trial is compared with, condition by condition. A search makes the score of a trial least.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -121,7 +121,7 @@ def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) ->
     }
 
 
-def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[object, ...]]:
+def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Rows:
     """Yield a row for each of the best trials, and for the experiment as it is."""
     best = trials.sort_values("score", kind="stable").head(MOST_ROWS)
     for row in records(pd.concat([best, trials[:1]]).drop_duplicates("trial")):
@@ -135,9 +135,7 @@ def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[
         )
 
 
-def best_trial_by_problem(
-    best_trial: Trial, search_scores: pd.DataFrame
-) -> Iterator[tuple[object, ...]]:
+def best_trial_by_problem(best_trial: Trial, search_scores: pd.DataFrame) -> Rows:
     """Yield a row per problem: the experiment as it is beside the best trial."""
     of_trial = search_scores["trial"]
     own, best = (search_scores[of_trial == number] for number in (0, best_trial.number))

@@ -161,15 +161,13 @@ def draw_tools(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _links(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:
+@table_of(" ".join([*LINK, "replicate"]))
+def _links(prepared: Prepared, sampled: measures.SampledMotion) -> Rows:
     assembly = prepared.problem.assembly
     places = motion_geometry.joint_positions(assembly, sampled.q)
-    rows = [
-        (robot, link, instant, *start[k, :2], *end[k, :2], item.radius)
-        for item, (robot, link, start, end) in zip(assembly.links, places, strict=True)
-        for k, instant in enumerate(sampled.instants)
-    ]
-    return pd.DataFrame(rows, columns=LINK).assign(replicate=-1)
+    for item, (robot, link, start, end) in zip(assembly.links, places, strict=True):
+        for k, instant in enumerate(sampled.instants):
+            yield robot, link, instant, *start[k, :2], *end[k, :2], item.radius, -1
 
 
 def _path(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:

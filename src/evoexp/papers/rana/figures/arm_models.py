@@ -1,6 +1,7 @@
 """Drawings of the models of arms: angles, via-points, links as touching circles or spheres."""
 
 import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,7 @@ from evoexp.papers import trails
 from evoexp.papers.rana import measures
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import (
-    Parts,
-    Rows,
-    groups,
-    marks,
-    motion_scenes,
-    records,
-    rounded,
-    style,
-    table_of,
-)
+from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style, table_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -38,7 +29,7 @@ NUMBERED = 5  # every fifth via-point carries its number
 
 
 @table_of("posture arm joint x y x_end y_end reference_deg angle_deg length_unit", is_rounded=True)
-def arms_table(condition: ConditionResults) -> Rows:
+def arms_table(condition: ConditionResults) -> Iterator[tuple[object, ...]]:
     """Return links and joint angles at start and goal."""
     problem, unit = condition.problem(Problem), condition.length_unit
     for posture, q in (("start", problem.start), ("goal", problem.goal)):
@@ -131,7 +122,7 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
     "element arm x y x_end y_end radius distance safety_distance instant length_unit",
     is_rounded=True,
 )
-def circles_table(condition: ConditionResults) -> Rows:
+def circles_table(condition: ConditionResults) -> Iterator[tuple[object, ...]]:
     """Return links and circles of the best replicate at its via-point of least centre distance."""
     problem = condition.problem(Problem)
     q = measures.best_motion(condition)
@@ -184,7 +175,7 @@ def draw_circles(table: pd.DataFrame) -> Figure:
 
 
 @table_of()
-def path_table(condition: ConditionResults, solution: FloatArray) -> Parts:
+def path_table(condition: ConditionResults, solution: FloatArray) -> Iterator[dict[str, Any]]:
     """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
     shape = condition.planner.shape(condition.problem(Problem))
     parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shape])[:-1])

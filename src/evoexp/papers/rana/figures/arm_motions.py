@@ -108,23 +108,21 @@ def _path(condition: ConditionResults, solution: FloatArray) -> Parts:
         yield columns | {f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)}
 
 
+@table_of()
 def tables_of_paths(
     condition: ConditionResults,
-    table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
+    table: Callable[[ConditionResults, FloatArray], pd.DataFrame],
     best: str,
-) -> pd.DataFrame:
+) -> Parts:
     """Return one table of the replicates' solutions and of the straight line."""
     solutions, best_replicate = condition.solutions, condition.best_replicate
     shown = [k for n, k in enumerate(solutions) if n < MOST_PATHS or k == best_replicate]
     others = OTHERS if len(shown) == len(solutions) else f"{OTHERS} of {len(solutions)}"
-    parts = [
-        table_of(condition, solutions[k]).assign(
-            series=best if k == best_replicate else others, replicate=k
-        )
-        for k in shown
-    ]
-    straight = table_of(condition, measures.straight_line(condition))
-    return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
+    for k in shown:
+        series = best if k == best_replicate else others
+        yield {**table(condition, solutions[k]), "series": series, "replicate": k}
+    straight = table(condition, measures.straight_line(condition))
+    yield {**straight, "series": STRAIGHT, "replicate": -1}
 
 
 def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = False) -> Figure:

@@ -27,7 +27,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise SettingError("--ioh", "a folder that is empty or not there yet", arguments.ioh)
     files, request, runs, strange = drawn(arguments)
     page = build.write_report(files)
-    rows = comparison.rated(runs, request.settings)
+    rows = [*comparison.rated(runs, request.settings)]
     if arguments.csv:
         write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:

@@ -98,22 +98,19 @@ def families(results: Results) -> tuple[Family, ...]:
     )
 
 
-def sweep_measures(results: Results, threshold: float) -> list[Measure]:
-    """Return the quantities that conditions are compared in."""
+def sweep_measures(results: Results, threshold: float) -> Iterator[Measure]:
+    """Yield the quantities that conditions are compared in."""
     to = f"to a team of cost ≤ {markdown.number(threshold)}"
-    found = [
-        Measure("best cost", by_column("best_cost")),
-        Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
-        Measure(measures.CERTIFIED, measures.certified_cost),
-    ]
+    yield Measure("best cost", by_column("best_cost"))
+    yield Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold))
+    yield Measure(measures.CERTIFIED, measures.certified_cost)
     pairs = [pair for family in families(results) for pair in family.pairs]
     if any(len({c.planner.ga.population_size for c in pair}) > 1 for pair in pairs):
         effort = partial(measures.evaluations_to, threshold=threshold)
-        found.append(Measure(f"evaluations {to}", effort))
+        yield Measure(f"evaluations {to}", effort)
     is_curved = any(c.planner.interpolation == "cubic" for c in results.with_data)
     if is_curved or len({_substeps(c) for c in results.with_data}) > 1:
-        found.append(Measure(COLLIDES, measures.refuted))
-    return found
+        yield Measure(COLLIDES, measures.refuted)
 
 
 def _substeps(condition: ConditionResults) -> int:

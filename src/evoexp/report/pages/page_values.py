@@ -122,17 +122,15 @@ def _pairs(results: Results) -> list[comparisons.Pair]:
 
 def pairs_of_conditions(
     results: Results, settings: ReportSettings, differing: dict[str, comparisons.Values]
-) -> tuple[tuple[str, tuple[comparisons.Comparison, ...]], ...]:
+) -> Iterator[tuple[str, tuple[comparisons.Comparison, ...]]]:
     """Compare pairs in every quantity in which they differ; p-values are adjusted within each."""
     of = "pairs of conditions"
     if len(results.evolved) > MOST_PAIRED:
         of = f"{results.evolved[0].label} against each other condition"
     pairs, named = _pairs(results), comparisons.AGAINST
-    found = {
-        f"{name}: {of}": comparisons.compared(pairs, values, settings, named=named)
-        for name, values in differing.items()
-    }
-    return tuple((heading, rows) for heading, rows in found.items() if rows)
+    for name, values in differing.items():
+        if rows := comparisons.compared(pairs, values, settings, named=named):
+            yield f"{name}: {of}", rows
 
 
 def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ...]]:

@@ -55,7 +55,7 @@ def test_rows_are_aligned_by_the_fewest_slips(printed: str, slips: list[tuple[in
 
 
 def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) -> None:
-    groups = path_claims.groups(smoke_results(outputs, "chen_path"))
+    groups = [*path_claims.groups(smoke_results(outputs, "chen_path"))]
     weights = {group.name: group.weights for group in groups}
     assert weights == {"(a)": (1, 0), "(b)": (0.1, 10), "(c)": (0.12, 20)}
     for group in groups:
@@ -69,7 +69,7 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
 
 @pytest.fixture(scope="module")
 def cases(outputs: Path) -> list[Case]:
-    return docking_postures.cases(smoke_results(outputs, "chen_placement"), PRINTED)
+    return list(docking_postures.cases(smoke_results(outputs, "chen_placement"), PRINTED))
 
 
 def test_conditions_are_told_apart(cases: list[Case]) -> None:

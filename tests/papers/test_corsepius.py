@@ -23,7 +23,6 @@ from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import Results, gather
-from evoexp.report.statistics import judging
 from evoexp.report.statistics.inference import Interval, Proportion
 from evoexp.report.statistics.judging import CONTRADICTED, NOT_JUDGED, REPRODUCED, UNDECIDED
 from report_samples import can_be_drawn, page_claims, page_settings, smoke_results, store
@@ -179,7 +178,7 @@ def test_a_series_without_points_is_not_in_the_legend() -> None:
 @pytest.mark.matrix
 def test_released_objects_stand_upright_on_the_table(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_pick_and_place").conditions[0]
-    found = measures.releases(condition)
+    found = [*measures.releases(condition)]
     assert found
     assert all(abs(gap) <= 0.001 + 1e-9 and tilt <= 1.0 * DEGREE for gap, tilt in found)
     assert "table – bottle" in measures.allowed_contacts(condition)
@@ -188,7 +187,6 @@ def test_released_objects_stand_upright_on_the_table(outputs: Path) -> None:
 
 RULES = read_page_file("evoexp.papers.corsepius").rules
 SETTINGS = page_settings("", "corsepius")
-JUDGE = judging.Judge("", SETTINGS, RULES)
 RUNS = 40
 TRUE = pd.array([True] * RUNS, dtype="boolean")
 Rows = Callable[[str], dict[str, object]]

@@ -34,8 +34,6 @@ draw(Path(sys.argv[1]), expand("rana_planar"))
 """
 FIGURES = ["fig_1_arms", "fig_2_via_points", "fig_3_circles", "fig_4_snapshots", "fig_5_fitness"]
 FIGURES += ["fig_6_paths", "fig_7_distances"]
-SPATIAL = ["fig_8_arm", "fig_9_two_arms", "fig_11_snapshots", "fig_12a_fitness"]
-SPATIAL += ["fig_12b_configuration_space", "fig_12b_operational_space", "fig_13_distances"]
 
 
 def draw(outputs: Path, experiment: Experiment, page: str | None = "rana", *formats: str) -> Path:

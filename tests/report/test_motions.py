@@ -104,7 +104,7 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
             shape="ellipse", center=(1.0, 2.0), semi_axes=(3.0, 0.5), angle=60.0
         ),
     )
-    outlines = motion_geometry.obstacle_outlines(obstacles.obstacle_table(bodies), 8.0)
+    outlines = [*motion_geometry.obstacle_outlines(obstacles.obstacle_table(bodies), 8.0)]
     ball, box, capsule, tin, lying, wall, egg = outlines
     for outline in outlines:
         np.testing.assert_allclose(outline[0], outline[-1], atol=1e-12)

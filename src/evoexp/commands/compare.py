@@ -22,7 +22,7 @@ def main(arguments: argparse.Namespace) -> int:
     arguments.overrides = unpacked(arguments.overrides)
     files, request, runs, strange = drawn(arguments)
     page = build.write_report(files)
-    rows = comparison.rated(runs, request.settings)
+    rows = [*comparison.rated(runs, request.settings)]
     if arguments.csv:
         write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:

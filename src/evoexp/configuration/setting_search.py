@@ -21,8 +21,8 @@ from filelock import FileLock, Timeout
 from evoexp.configuration.experiment import Built, Experiment
 from evoexp.configuration.overrides import SWEEP, Choice, Override, Value
 from evoexp.errors import Busy, EvoexpError, SettingError, StoreError, brief
+from evoexp.report.pages.searched import Searched, Trial, score_table
 from evoexp.report.results.stored_results import gather
-from evoexp.report.results.trials import Searched, Trial, score_table
 from evoexp.store.run_directory import outputs_root
 from evoexp.validation import Count, NonNegativeCount, Positive, Settings
 

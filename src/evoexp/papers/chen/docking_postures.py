@@ -117,8 +117,8 @@ class Case(NamedTuple):
         }
 
 
-def cases(results: Results, printed_postures: Mapping[str, Any]) -> list[Case]:
-    """Return the criteria in the order of the experiment, each with its conditions."""
+def cases(results: Results, printed_postures: Mapping[str, Any]) -> Iterator[Case]:
+    """Yield the criteria in the order of the experiment, each with its conditions."""
     names: dict[Any, str] = {  # weights of the terms, links that avoid obstacles → name
         (True, False, False): "least torque norm",
         (False, True, False): MINIMAX,
@@ -126,7 +126,6 @@ def cases(results: Results, printed_postures: Mapping[str, Any]) -> list[Case]:
         (True, False, False, 0): "obstacle and platform",
         (True, False, True): MANIPULABILITY,
     }
-    found = []
     for own in grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective)):
         roles: dict[str, ConditionResults] = {}
         for c in own:
@@ -139,8 +138,7 @@ def cases(results: Results, printed_postures: Mapping[str, Any]) -> list[Case]:
         criterion = (*map(bool, weights), *(one.link for one in cost.avoidances))
         name = names.get(criterion, own[0].label)
         printed = PrintedPosture(**printed_postures.get(name, {}))
-        found.append(Case(name, **roles, printed=printed))
-    return found
+        yield Case(name, **roles, printed=printed)
 
 
 def landscape_row(case: Case) -> tuple[object, ...]:
@@ -189,9 +187,8 @@ def posture_rows(cases: list[Case]) -> Iterator[tuple[str, ...]]:
                 yield tuple(cell.replace("-", "−") for cell in row)
 
 
-def posture_checks(case: Case) -> list[tuple[str, str]]:
-    """Return the rows on the local minima, and on contacts of the exact bodies."""
-    rows = []
+def posture_checks(case: Case) -> Iterator[tuple[str, str]]:
+    """Yield the rows on the local minima, and on contacts of the exact bodies."""
     if case.optimum is not None:
         values = ", ".join(f"{value:.4g}" for value in case.minima[:, 2])
         touching = case.optimum.summaries["certified"].eq(False).any()
@@ -200,19 +197,12 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
         pair = str(case.optimum.summaries[column].iloc[0])
         named = pair.replace("arm_1_link_", "link ").replace("obstacle_1", "obstacle")
         told = "touches" if touching else f"is free, clearance {clearance}"
-        rows = [
-            (f"{case.name}: local minima", values),
-            (f"{case.name}: bodies at the exact optimum", f"{told} ({named})"),
-        ]
+        yield f"{case.name}: local minima", values
+        yield f"{case.name}: bodies at the exact optimum", f"{told} ({named})"
     if case.conditions[0].planner.objective.avoidances:
-        rows += [
-            (
-                f"{case.name}: {name}, exact bodies",
-                f"{c.verdicts.refuted} of {c.verdicts.judged} best postures touch",
-            )
-            for name, c in case.evolved.items()
-        ]
-    return rows
+        for name, c in case.evolved.items():
+            told = f"{c.verdicts.refuted} of {c.verdicts.judged} best postures touch"
+            yield f"{case.name}: {name}, exact bodies", told
 
 
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:

@@ -56,17 +56,15 @@ def fits_paths(results: Results) -> bool:
     return evolved and all(len(c.scenario.size) == 2 for c in found)
 
 
-def groups(results: Results) -> tuple[Group, ...]:
-    """Return the conditions by weighting and rule for loops, in the order of the experiment."""
-    found = []
+def groups(results: Results) -> Iterator[Group]:
+    """Yield the conditions by weighting and rule for loops, in the order of the experiment."""
     for members in run_measures.grouped(
         results.with_data, lambda c: (c.planner.objective.weights, c.planner.revisits)
     ):
         evolved = tuple(c for c in members if not c.is_reference)
         truth = next((c for c in members if c.is_reference), None)
         weights, revisits = members[0].planner.objective.weights, members[0].planner.revisits
-        found += [Group(c.label, weights, revisits, evolved, truth) for c in evolved[:1]]
-    return tuple(found)
+        yield from (Group(c.label, weights, revisits, evolved, truth) for c in evolved[:1])
 
 
 def truth(results: Results, condition: ConditionResults) -> ConditionResults | None:

@@ -56,22 +56,16 @@ def times_vary(judge: Judge, results: Results, obstructed: Conditions) -> Iterat
         yield hearing.own(told, sum(c.done for c in obstructed), 2 * len(wide) > len(ratios))
 
 
-def stuck_at_obstacles(judge: Judge, main: Conditions) -> Iterator[Claim]:
+def stuck_at_obstacles(judge: Judge, empty_scenes: measures.EmptyScenes) -> Iterator[Claim]:
     """Judge that obstacles, and nothing else, keep the search from its goals."""
-    pairs = measures.pairs_but_for("empty_scene", main)
-    shares = [(run_measures.success(c), run_measures.success(empty)) for c, empty in pairs]
-    adjusted = inference.fisher_family(shares)
     told = "; ".join(
         f"{c.label} {own}, empty scene {empty}, p = {markdown.p_value(p)}"
-        for (c, _), (own, empty), p in zip(pairs, shares, adjusted, strict=True)
+        for (c, _), (own, empty), p in empty_scenes
     )
-    less = [
-        p < judge.settings.significance
-        for (own, empty), p in zip(shares, adjusted, strict=True)
-        if own.share < empty.share
-    ]
-    if pairs:
-        runs = sum(one.total for pair in shares for one in pair)
+    level = judge.settings.significance
+    less = [p < level for _, (own, empty), p in empty_scenes if own.share < empty.share]
+    if empty_scenes:
+        runs = sum(one.total for _, shares, _ in empty_scenes for one in shares)
         holds = True if any(less) else None if less else False
         yield judge.on("stuck_at_obstacles").own(told, runs, holds)
 

@@ -34,6 +34,8 @@ TILTS = ("upright", "keep_parallel")  # of a grasped object, that a task may lim
 
 Conditions = tuple[ConditionResults, ...]
 Pair = tuple[ConditionResults, ConditionResults]
+# (a task, its empty scene), success of both, p-value adjusted over the tasks
+EmptyScenes = list[tuple[Pair, tuple[Proportion, Proportion], float]]
 
 
 class ShownPath(NamedTuple):
@@ -203,13 +205,13 @@ def allowed_contacts(condition: ConditionResults) -> str:
     return ", ".join(pairs) if condition.scenario.allowed_penetration else ""
 
 
-def releases(condition: ConditionResults) -> list[tuple[float, float]]:
-    """Return (gap, tilt) of the object in every run that lets go of it, by coal's distances.
+def releases(condition: ConditionResults) -> Iterator[tuple[float, float]]:
+    """Yield (gap, tilt) of the object in every run that lets go of it, by coal's distances.
 
     The gap is to the nearest body that it may touch, negative where it stands in it [length unit],
     the tilt that of its axis from the direction up [rad].
     """
-    own, found = condition.problem(Problem), []
+    own = condition.problem(Problem)
     for q in paths(condition).values():
         for span in own.spans(q):
             if span.stage.phase.then == "detach" and span.reached:
@@ -217,9 +219,7 @@ def releases(condition: ConditionResults) -> list[tuple[float, float]]:
                 pairs = np.array([contact[:2] for contact in bodies.contacts], dtype=np.int64)
                 distance = CoalDistance(bodies._replace(pairs=pairs), Motion(q), MANY_QUERIES)
                 gaps = [distance(pair, float(span.last)) for pair in range(len(pairs))]
-                tilt = float(span.judged.rows[UPRIGHT, -1])
-                found.append((min(gaps, default=np.inf), tilt))
-    return found
+                yield min(gaps, default=np.inf), float(span.judged.rows[UPRIGHT, -1])
 
 
 def approaches_across(condition: ConditionResults, rules: Rules) -> BoolArray:
@@ -270,25 +270,25 @@ def tilts(results: Results) -> Iterator[Quantity]:
                 yield quantity(results, name, "deg", values)
 
 
-def beside_empty(results: Results, confidence: float) -> tuple[tuple[str, ...], ...]:
-    """Return a row per task that has an empty scene as its control: shares, test, cycles."""
-    pairs = pairs_but_for("empty_scene", results.main)
-    shares = [(run_measures.success(c), run_measures.success(e)) for c, e in pairs]
-    return tuple(
-        (
-            pair[0].label,
-            *(share.with_interval(confidence) for share in both),
-            markdown.p_value(p),
-            *(markdown.spread(inference.spread(cycles(one))) for one in pair),
-        )
-        for pair, both, p in zip(pairs, shares, inference.fisher_family(shares), strict=True)
-    )
+def empty_scenes(main: Conditions) -> EmptyScenes:
+    """Return the tasks that have an empty scene as their control, with a test of their success."""
+    pairs = pairs_but_for("empty_scene", main)
+    shares = [(run_measures.success(c), run_measures.success(empty)) for c, empty in pairs]
+    return list(zip(pairs, shares, inference.fisher_family(shares), strict=True))
+
+
+def beside_empty(empty_scenes: EmptyScenes, confidence: float) -> Iterator[tuple[str, ...]]:
+    """Yield a row per task that has an empty scene as its control: shares, test, cycles."""
+    for pair, both, p in empty_scenes:
+        shares = (share.with_interval(confidence) for share in both)
+        spreads = (markdown.spread(inference.spread(cycles(one))) for one in pair)
+        yield pair[0].label, *shares, markdown.p_value(p), *spreads
 
 
 def release_rows(obstructed: Conditions) -> Iterator[tuple[str, ...]]:
     """Yield gap and tilt of the objects that a condition lets go of: medians and the worst."""
     for condition in obstructed:
-        if found := releases(condition):
+        if found := [*releases(condition)]:
             gaps, tilts = np.array(found).T
             deepest, highest = (
                 f"{markdown.number(float(f'{max(0.0, value):.2g}'))} {condition.length_unit}"

@@ -98,22 +98,19 @@ def families(results: Results) -> tuple[Family, ...]:
     )
 
 
-def sweep_measures(results: Results, threshold: float) -> list[Measure]:
-    """Return the quantities that conditions are compared in."""
+def sweep_measures(results: Results, threshold: float) -> Iterator[Measure]:
+    """Yield the quantities that conditions are compared in."""
     to = f"to a team of cost ≤ {markdown.number(threshold)}"
-    found = [
-        Measure("best cost", by_column("best_cost")),
-        Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
-        Measure(measures.CERTIFIED, measures.certified_cost),
-    ]
+    yield Measure("best cost", by_column("best_cost"))
+    yield Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold))
+    yield Measure(measures.CERTIFIED, measures.certified_cost)
     pairs = [pair for family in families(results) for pair in family.pairs]
     if any(len({c.planner.ga.population_size for c in pair}) > 1 for pair in pairs):
         effort = partial(measures.evaluations_to, threshold=threshold)
-        found.append(Measure(f"evaluations {to}", effort))
+        yield Measure(f"evaluations {to}", effort)
     is_curved = any(c.planner.interpolation == "cubic" for c in results.with_data)
     if is_curved or len({_substeps(c) for c in results.with_data}) > 1:
-        found.append(Measure(COLLIDES, measures.refuted))
-    return found
+        yield Measure(COLLIDES, measures.refuted)
 
 
 def _substeps(condition: ConditionResults) -> int:
@@ -161,7 +158,7 @@ class Share(NamedTuple):
         return f"{100 * self.value:.0f} %" + within * bool(np.isfinite(self.interval).any())
 
 
-def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
+def corners(conditions: Sequence[ConditionResults]) -> Iterator[Corner]:
     """Group conditions that differ in hall and elites only; groups that lack one are left out."""
 
     def key(condition: ConditionResults) -> tuple[object, ...]:
@@ -174,7 +171,6 @@ def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
             return "elites" if ga.num_elites else "nothing"
         return "other" if ga.hall_frozen or ga.hall_memory is not None else str(ga.hall_distinct)
 
-    found = []
     for own in run_measures.grouped(conditions, key):
         by: dict[str, list[ConditionResults]] = {}
         for c in own:
@@ -183,8 +179,7 @@ def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
             elites = tuple(sorted(by["elites"], key=lambda c: int(c.planner.ga.num_elites)))
             halls = (*by["genome"][:1], *by.get("index", ())[:1])
             name, others = halls[0].label.rpartition(", ")[0], tuple(by.get("other", ()))
-            found.append(Corner(name, by["nothing"][0], elites, halls, others))
-    return tuple(found)
+            yield Corner(name, by["nothing"][0], elites, halls, others)
 
 
 def share(gain: Gain, compared: Sequence[ConditionResults], settings: ReportSettings) -> Share:

@@ -1,6 +1,6 @@
 """Figures of Lavoie & Boudreau 2001: motions (Figs. 1, 2), errors below x (Fig. 3), stopping."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import Percentage
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.figures import Rows, groups, marks, records, style, table_of
 from evoexp.report.figures.effort_curves import BEFORE, draw_steps
 from evoexp.report.pages import markdown
 from evoexp.report.results import motion_geometry
@@ -26,10 +26,6 @@ from evoexp.report.statistics.inference import Proportion, spread
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
 LINK, TOUCHING, CONTACT = "link", "touching", "contact"
-NAMES = [
-    *("element", "name", "sub_path", "instant", "link"),
-    *("x", "y", "x_end", "y_end", "semi_a", "semi_b", "angle_deg"),
-]
 NO_SIZE = (np.nan,) * 3
 MOST_POSTURES = 10  # of a sub-path that are drawn
 TARGETS = ("via point", "goal point")
@@ -44,16 +40,8 @@ PLACES: tuple[tuple[str, tuple[int, int], Literal["left", "right"]], ...] = (
     ("B", (8, 5), "left"),
 )
 FOUND, PRINTED = "found", "printed"
-DISTRIBUTION_COLUMNS = [
-    *("series", "position", "condition", "error", "having", "total"),
-    *("share", "lower", "upper"),
-]
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart
-STOPPING_COLUMNS = [
-    *("quantity", "num_generations", "stop_cost", "condition"),
-    *("median", "lower", "upper", "solved", "done"),
-]
 
 
 class ShownMotion(NamedTuple):
@@ -78,9 +66,13 @@ def _shown(condition: ConditionResults, among: np.ndarray) -> ShownMotion:
     return ShownMotion(title, condition, replicate, contacts)
 
 
-def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
+@table_of(
+    "panel title element name sub_path instant link x y x_end y_end semi_a semi_b angle_deg "
+    "length_unit",
+    is_rounded=True,
+)
+def reaching_table(shown: Sequence[ShownMotion]) -> Rows:
     """Return scenes, postures and contacts."""
-    parts = []
     for panel, one in enumerate(shown):
         scenario, unit = one.condition.scenario, one.condition.length_unit
         table = scenario.obstacle_table()
@@ -97,8 +89,7 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
             *((TARGET, name, *point, *point, *NO_SIZE) for name, point in targets),
         ]
         rows = [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in scene]
-        parts += [(panel, one.title, *row, unit) for row in (*rows, *_postures(one))]
-    return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
+        yield from ((panel, one.title, *row, unit) for row in (*rows, *_postures(one)))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
@@ -124,7 +115,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
+def _postures(one: ShownMotion) -> Rows:
     """Yield the links at the start, at tested positions of both sub-paths, and where they touch."""
     c = one.condition
     if one.replicate is None:
@@ -141,16 +132,13 @@ def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
         yield from _links(one, TOUCHING, np.array([instant]), motion.at(instant)[:, None])
 
 
-def _links(
-    one: ShownMotion, element: str, instants: FloatArray, q: FloatArray
-) -> list[tuple[Any, ...]]:
-    """Return the links at some instants, q (nq, instants) [rad]."""
+def _links(one: ShownMotion, element: str, instants: FloatArray, q: FloatArray) -> Rows:
+    """Yield the links at some instants, q (nq, instants) [rad]."""
     assembly = one.condition.problem(Problem).assembly
-    return [
-        (element, "arm", int(np.ceil(t)), t, link, *start[k, :2], *end[k, :2], *NO_SIZE)
-        for _, link, start, end in motion_geometry.joint_positions(assembly, q / DEGREE)
-        for k, t in enumerate(instants)
-    ]
+    for _, link, start, end in motion_geometry.joint_positions(assembly, q / DEGREE):
+        for k, t in enumerate(instants):
+            ends = *start[k, :2], *end[k, :2]
+            yield element, "arm", int(np.ceil(t)), t, link, *ends, *NO_SIZE
 
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
@@ -191,14 +179,15 @@ def _draw_postures(axes: Axes, rows: pd.DataFrame) -> None:
         marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9, **cross)
 
 
+@table_of("series position condition error having total share lower upper length_unit")
 def distribution_table(
     results: Results,
     errors: Values,
     printed: Callable[[ConditionResults], Sequence[Percentage]],
     confidence: float,
-) -> pd.DataFrame:
+) -> Rows:
     """Return P(error < x) of every condition at each error that occurs, and the printed points."""
-    rows: list[tuple[object, ...]] = []
+    unit = results.with_data[0].length_unit
     for c in results.with_data:
         values = errors(c)
         steps, counts = np.unique(values[np.isfinite(values)], return_counts=True)
@@ -207,10 +196,7 @@ def distribution_table(
         points += [(PRINTED, one.bound, one.proportion) for one in printed(c)]
         for series, x, share in points:
             given = series, results.position(c.label), c.label, x
-            rows.append((*given, *share, share.share, *share.interval(confidence)))
-    unit = results.with_data[0].length_unit
-    table = pd.DataFrame(rows, columns=DISTRIBUTION_COLUMNS)
-    return table.astype({"error": "float64"}).assign(length_unit=unit)
+            yield *given, *share, share.share, *share.interval(confidence), unit
 
 
 def draw_distribution(table: pd.DataFrame) -> Figure:
@@ -247,18 +233,14 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataFrame:
+@table_of("quantity num_generations stop_cost condition median lower upper solved done length_unit")
+def stopping_table(results: Results, errors: Values, effort: Values) -> Rows:
     """Return precision and effort of every condition by its stopping value and its generations."""
-    rows = [
-        (
-            *(name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label),
-            *(*spread(values(c))[:3], c.solved, c.done),
-        )
-        for name, values in ((ERROR, errors), (EFFORT, effort))
-        for c in results.with_data
-    ]
     unit = results.with_data[0].length_unit
-    return pd.DataFrame(rows, columns=STOPPING_COLUMNS).assign(length_unit=unit)
+    for name, values in ((ERROR, errors), (EFFORT, effort)):
+        for c in results.with_data:
+            given = name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label
+            yield *given, *spread(values(c))[:3], c.solved, c.done, unit
 
 
 def draw_stopping(table: pd.DataFrame) -> Figure:
@@ -301,17 +283,16 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
 }
 
 
-def anytime_table(results: Results, effort: Values) -> pd.DataFrame:
+@table_of("joints planner evaluations share runs")
+def anytime_table(results: Results, effort: Values) -> Rows:
     """Return the share of runs that have a solution after so many evaluations, per condition."""
-    rows = []
     conditions = [c for c in results.evolved if c.done]
     begin = BEFORE * min(float(effort(c).min()) for c in conditions)
     for c in conditions:
         efforts = np.sort(effort(c)[np.isfinite(effort(c))])
         steps = [(begin, 0), *((x, n + 1) for n, x in enumerate(efforts))]
         steps.append((float(c.column("evaluations").max()), len(efforts)))
-        rows += [(num_joints(c), c.label, x, n / c.done, c.done) for x, n in steps]
-    return pd.DataFrame(rows, columns=["joints", "planner", "evaluations", "share", "runs"])
+        yield from ((num_joints(c), c.label, x, n / c.done, c.done) for x, n in steps)
 
 
 def draw_anytime(table: pd.DataFrame) -> Figure:

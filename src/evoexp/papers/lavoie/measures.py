@@ -175,17 +175,15 @@ def printed_shares(results: Results) -> dict[str, float]:
 
 def share_rows(
     results: Results, refuted: Callable[[ConditionResults], RefutedMotions]
-) -> list[tuple[str, int, str, Proportion]]:
-    """Return the counts that are drawn, by sub-path if the tests of paths differ."""
-    rows = []
+) -> Iterator[tuple[str, int, str, Proportion]]:
+    """Yield the counts that are drawn, by sub-path if the tests of paths differ."""
     for position, c in enumerate(results.with_data):
         found = refuted(c)
         told = {"touch an obstacle": found.anywhere, "on SP1": found.sp1, "on SP2": found.sp2}
         if not paths_differ(results):
             near = {f"error below {BOUND:g}": below(c, BOUND)}
             told = near | {"with a solution": run_measures.success(c)} | dict([*told.items()][:1])
-        rows += [(name, position, c.label, proportion) for name, proportion in told.items()]
-    return rows
+        yield from ((name, position, c.label, share) for name, share in told.items())
 
 
 def literal_start(condition: ConditionResults) -> str:
@@ -206,7 +204,7 @@ def literal_start(condition: ConditionResults) -> str:
     return f"not free of collision: link {contact.link} touches obstacle {contact.obstacle}"
 
 
-def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Claim]:
+def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> Iterator[Claim]:
     """Judge the percentages printed for arms of so many joints, as one family of tests.
 
     Both percentages are samples: a printed one is contradicted where Fisher's exact test, adjusted
@@ -216,7 +214,6 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Cl
     shares = [(below(c, one.bound), one.proportion) for c, one in pairs]
     p_values = inference.fisher_family(shares)
     each = 1.0 - (1.0 - judge.level) / max(1, len(pairs))  # Bonferroni: of all intervals together
-    claims = []
     for (c, one), (own, theirs), p_adjusted in zip(pairs, shares, p_values, strict=True):
         within, (low, high) = own.interval(judge.level), theirs.interval(judge.level)
         place = "within" if within.low <= theirs.share <= within.high else "outside"
@@ -225,8 +222,7 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Cl
         words = {"bound": f"{one.bound:g}", "share": f"{100 * theirs.share:.1f}"}
         hearing = judge.on("share_below", who=c.label, **words)
         told |= {"confidence": judge.level, "level": 100 * judge.level}
-        claims.append(hearing.same_share(told, own, theirs, p_adjusted))
-    return claims
+        yield hearing.same_share(told, own, theirs, p_adjusted)
 
 
 def first_percentage(judge: Judge, condition: ConditionResults, main: Group) -> Claim:
@@ -238,7 +234,7 @@ def first_percentage(judge: Judge, condition: ConditionResults, main: Group) -> 
     # number of joints → the condition as assumed, which is the first one of the arm
     assumed = {run_measures.num_joints(c): c for c in reversed(main)}
     others = [c for joints, c in assumed.items() if joints != run_measures.num_joints(condition)]
-    return percentages(judge, [condition, *others])[0]
+    return next(percentages(judge, [condition, *others]))
 
 
 def _difference(own: Proportion, theirs: Proportion, level: float) -> str:

@@ -1,6 +1,6 @@
 """The claims of Rana & Zalzala 1995, judged by their experiments, ablations and controls."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,10 +59,12 @@ def operators(
     own = own_judge._replace(reason=reason)
     told = f"its ablations are not stored: `evoexp run experiment={experiment}`"
     alone = own_judge.on("operators_improve", who=who, without="each alone")
-    return operator_claims(stored, own, who, PRINTED) or [alone.elsewhere(told)]
+    return [*operator_claims(stored, own, who, PRINTED)] or [alone.elsewhere(told)]
 
 
-def operator_claims(results: Results, judge: Judge, who: str = "", first: str = "") -> list[Claim]:
+def operator_claims(
+    results: Results, judge: Judge, who: str = "", first: str = ""
+) -> Iterator[Claim]:
     """Judge the paper's claim about relaxation and redistribution, part by part that was run.
 
     `who` begins each claim; `first` is the label of the printed setting, or else the first one.
@@ -70,7 +72,7 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
     named = {condition.label: condition for condition in results.with_data}
     printed = named.get(first or next(iter(named), ""))
     if printed is None:
-        return []
+        return
     others = [other for other in named.values() if other is not printed]
     found = comparisons.compare_families([Family.of([printed, *others])], COMPARED, judge.settings)
     rows = {one.measure.name: {row.quantity: row for row in one.rows} for one in found}
@@ -78,7 +80,6 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
     counts = {c.label: measures.refuted(c) for c in (printed, *parts)}
     own, level = counts[printed.label], judge.settings.significance
     p_values = fisher_family([(own, counts[part.label]) for part in parts])
-    claims = []
     for part, p_value in zip(parts, p_values, strict=True):
         other = counts[part.label]
         says = [by[part.label].says(level) for by in rows.values() if part.label in by]
@@ -90,8 +91,7 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
         }
         told |= {"own": own, "other": other, "p": p_value}
         hearing = judge.on("operators_improve", who=who, without=part.label)
-        claims.append(hearing.own(told, printed.done, improves(says)))
-    return claims
+        yield hearing.own(told, printed.done, improves(says))
 
 
 def improves(says: list[int]) -> bool | None:
@@ -153,14 +153,12 @@ def evolution_adds(
     return judge.on("evolution_adds", who=who).better_than_all("; ".join(told), compared)
 
 
-def extensions(condition: ConditionResults) -> list[str]:
-    """Return section 5's claims of extension: to static obstacles, to more than two arms."""
-    arms, found = condition.problem(Problem).assembly.num_arms, []
+def extensions(condition: ConditionResults) -> Iterator[str]:
+    """Yield section 5's claims of extension: to static obstacles, to more than two arms."""
     if measures.TO_OBSTACLES in measures.kinds_of_pairs(condition):
-        found.append("The algorithm can easily be extended to static obstacles")
-    if arms > 2:
-        found.append(f"The algorithm plans for any multi-arm system, here for {arms} arms")
-    return found
+        yield "The algorithm can easily be extended to static obstacles"
+    if (arms := condition.problem(Problem).assembly.num_arms) > 2:
+        yield f"The algorithm plans for any multi-arm system, here for {arms} arms"
 
 
 def least_distances(condition: ConditionResults) -> str:

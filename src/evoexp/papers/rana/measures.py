@@ -4,14 +4,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import BoolArray, FloatArray, generations
-from evoexp.report.figures import DECIMALS
+from evoexp.report.figures import DECIMALS, Rows, table_of
 from evoexp.report.pages import markdown
 from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.run_measures import counted, grouped, summed
@@ -83,20 +82,18 @@ def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, f
     return {name: kind for name, kind in kinds.items() if kind[0].any()}
 
 
-def approaches(condition: ConditionResults) -> pd.DataFrame:
+@table_of("kind replicate clearance clearance_at refuted_at kept")
+def approaches(condition: ConditionResults) -> Rows:
     """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
 
     `refuted_at` is NaN where they touch nowhere; `kept` says whether the required distance is.
     """
-    rows = []
     for name, (kept, margin) in kinds_of_pairs(condition).items():
         bodies = condition.problem(Problem).scene.of_pairs(kept)
         for k in condition.solutions:
             verdict = certify(bodies, condition.motion(k), margin)
             where = verdict.clearance, verdict.clearance_at, verdict.refuted_at
-            rows.append((name, k, *where, verdict.margin_status == "certified"))
-    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
-    return pd.DataFrame(rows, columns=names)
+            yield name, k, *where, verdict.margin_status == "certified"
 
 
 def colliding_after(condition: ConditionResults, relaxed: bool) -> int:
@@ -357,8 +354,4 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "shorter": lambda condition: falls(condition, "length_arm_"),
     "evener": lambda condition: falls(condition, "unevenness_arm_"),
     "fewer_collisions": lambda condition: falls(condition, "collisions"),
-    # motions whose bodies never come closer than the safety distance, exactly
-    "with_margin": lambda condition: Proportion(
-        condition.verdicts.with_margin, condition.verdicts.judged
-    ),
 }

@@ -4,8 +4,9 @@ The columns of each table stand in `page.yaml`, with its figure. Here are the sm
 tables that they share.
 """
 
-from collections.abc import Iterator
-from typing import Any
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ParamSpec
 
 import pandas as pd
 
@@ -13,14 +14,41 @@ import pandas as pd
 DECIMALS = 12
 
 
+Arguments = ParamSpec("Arguments")
+Rows = Iterator[tuple[object, ...]]  # of a table, one by one
+Parts = Iterator[Mapping[str, Any]]  # of a table, one below the other: name → column
+
+
+def table_of(
+    names: str = "", *, is_rounded: bool = False
+) -> Callable[[Callable[Arguments, Rows | Parts]], Callable[Arguments, pd.DataFrame]]:
+    """Make a table of a function that yields rows, with columns of these names, or its parts."""
+
+    def made(yielding: Callable[Arguments, Rows | Parts]) -> Callable[Arguments, pd.DataFrame]:
+        @functools.wraps(yielding)
+        def table(*arguments: Arguments.args, **named: Arguments.kwargs) -> pd.DataFrame:
+            found: Any = yielding(*arguments, **named)
+            if names:
+                found = pd.DataFrame(list(found), columns=names.split())
+            else:
+                found = pd.concat(map(pd.DataFrame, found), ignore_index=True)
+            return rounded(found) if is_rounded else found
+
+        return table
+
+    return made
+
+
 def records(table: pd.DataFrame) -> Iterator[Any]:
     """Yield rows with their columns as attributes."""
     yield from table.itertuples(index=False)
 
 
-def groups(table: pd.DataFrame, by: str | list[str]) -> Iterator[tuple[Any, pd.DataFrame]]:
-    """Yield (key, rows) in the order of the keys."""
-    yield from table.groupby(by, sort=True)
+def groups(
+    table: pd.DataFrame, by: str | list[str], *, in_order: bool = True
+) -> Iterator[tuple[Any, pd.DataFrame]]:
+    """Yield (key, rows) in the order of the keys, or in that of their first rows."""
+    yield from table.groupby(by, sort=in_order)
 
 
 def rounded(table: pd.DataFrame) -> pd.DataFrame:

@@ -1,5 +1,6 @@
-"""Costs over generations, over evaluations and over the settings of a sweep, with their effects."""
+"""Costs over generations, over evaluations and over settings: of sweeps and of searches."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -8,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report.figures import groups, marks, records, style
+from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
 from evoexp.report.figures.marks import name_curves, name_ends
 from evoexp.report.pages.swept import MOST_PANELS, Sweep, labelled
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -91,8 +92,8 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _condition(results: Results, condition: ConditionResults, objective: Any) -> pd.DataFrame:
-    parts = []
+@table_of()
+def _condition(results: Results, condition: ConditionResults, objective: Any) -> Parts:
     for column in COLUMNS:
         rows = condition.generations[["replicate", "index", "evaluations", column]]
         if objective is not None:
@@ -107,9 +108,7 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
         given |= {"position": results.position(condition.label), "quantity": NAMES[column]}
         evaluations = quantiles(spent.to_numpy(np.float64), (0.5,))[0]
         given |= {"generation": wide.index, "evaluations": evaluations, "median": median}
-        given |= {"lower": lower, "upper": upper, "replicates": replicates}
-        parts.append(pd.DataFrame(given))
-    return pd.concat(parts, ignore_index=True)
+        yield given | {"lower": lower, "upper": upper, "replicates": replicates}
 
 
 def _curves(axes: Axes, table: pd.DataFrame) -> None:
@@ -161,9 +160,11 @@ SETTLED = 0.05  # [-] of a run, after which the panels show all costs
 ORDINAL, PALEST = "viridis", 0.8  # colours of values that have an order, the palest to be read
 
 
-def grid_table(sweep: Sweep, values: Values) -> pd.DataFrame:
+@table_of("panel x y column row median lower upper runs x_setting y_setting")
+def grid_table(sweep: Sweep, values: Values) -> Rows:
     """Return median and quartiles of a quantity of each combination."""
-    found, last = [], len(sweep.settings) - 1
+    last = len(sweep.settings) - 1
+    across, up = sweep.settings[last], sweep.settings[last - 1] if last else ""
     levels = [sweep.levels(k) for k in range(len(sweep.settings))]
     for each in sweep.conditions:
         if not each.results.done:
@@ -174,11 +175,7 @@ def grid_table(sweep: Sweep, values: Values) -> pd.DataFrame:
         x, y = each.values[last], each.values[last - 1] if last else ""
         row = levels[last - 1].index(y) if last else 0
         spread = (quantile(own, share) for share in (0.5, 0.25, 0.75))
-        found.append((panel, x, y, levels[last].index(x), row, *spread, len(own)))
-    names = ["panel", "x", "y", "column", "row", "median", "lower", "upper", "runs"]
-    return pd.DataFrame(found, columns=names).assign(
-        x_setting=sweep.settings[last], y_setting=sweep.settings[last - 1] if last else ""
-    )
+        yield panel, x, y, levels[last].index(x), row, *spread, len(own), across, up
 
 
 def draw_grid(table: pd.DataFrame, name: str) -> Figure:
@@ -187,14 +184,13 @@ def draw_grid(table: pd.DataFrame, name: str) -> Figure:
 
 
 def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
-    panels = list(dict.fromkeys(table["panel"]))[:MOST_PANELS]
+    panels = list(groups(table, "panel", in_order=False))[:MOST_PANELS]
     rows = int(table["row"].max()) + 1
     figure, axes_of = style.panels(0.42 * rows + 1.15, len(panels), PER_LINE, 0.0)
     finite = table.loc[np.isfinite(table["median"]), "median"]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     image = None
-    for axes, panel in zip(axes_of, panels, strict=True):
-        own = table[table["panel"] == panel]
+    for axes, (panel, own) in zip(axes_of, panels, strict=True):
         cells = own.pivot(index="row", columns="column", values="median")
         cells = cells.reindex(index=range(rows), columns=range(int(table["column"].max()) + 1))
         shown = cells.to_numpy(np.float64)
@@ -223,11 +219,10 @@ def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
 
 def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
     figure, (axes,) = style.panels(3.2)
-    panels = list(dict.fromkeys(table["panel"]))
     ends = []
-    for k, panel in enumerate(panels):
-        own = table[table["panel"] == panel].sort_values("column")
-        own = own[np.isfinite(own[["median", "lower", "upper"]]).all(axis=1)]
+    for k, (panel, rows) in enumerate(groups(table, "panel", in_order=False)):
+        finite = rows.replace([np.inf, -np.inf], np.nan).dropna(subset=["median", "lower", "upper"])
+        own = finite.sort_values("column")
         if own.empty:
             continue
         colour, last = style.condition_colour(k), own.iloc[-1]
@@ -238,18 +233,18 @@ def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
     axes.set_xticks(ticks["column"], ticks["x"])
     axes.margins(x=0.05)
     axes.set(xlabel=table["x_setting"].iloc[0], ylabel=f"{name} (median, quartiles)")
-    if any(panels):
+    if table["panel"].any():
         name_ends(axes, ends)
     return figure
 
 
 def draw_effects(table: pd.DataFrame) -> Figure:
     """Draw the median differences with their intervals, one panel per swept condition."""
-    bases = list(dict.fromkeys(table["base"]))[:MOST_PANELS]
-    rows = max(int((table["base"] == base).sum()) for base in bases)
+    bases = list(groups(table, "base", in_order=False))[:MOST_PANELS]
+    rows = max(len(own) for _, own in bases)
     figure, panels = style.panels(0.26 * rows + 1.0, len(bases), PER_LINE, 0.0)
-    for axes, base in zip(panels, bases, strict=True):
-        own = table[table["base"] == base].reset_index(drop=True)
+    for axes, (base, rows_of_base) in zip(panels, bases, strict=True):
+        own = rows_of_base.reset_index(drop=True)
         finite = own[np.isfinite(own[["difference", "low", "high"]]).all(axis=1)]
         errors = [finite["difference"] - finite["low"], finite["high"] - finite["difference"]]
         look: dict[str, Any] = {"fmt": "o", "ms": 4, "capsize": 2.0, "color": style.NEUTRAL}
@@ -313,4 +308,73 @@ def draw_facets(table: pd.DataFrame) -> Figure:
     style.keys_below(
         figure, [style.key(f"medians, quartiles; at the ends of curves: {setting}", lw=0)]
     )
+    return figure
+
+
+NUMBERS = ("trial", "score", "best", "proven", "runs", "queries")  # columns of no setting
+MOST_SETTINGS = 9  # panels of a figure
+HIGHEST = 1.5  # score at the top of a panel, in that of the experiment as it is
+ORDERS = 30.0  # ratio of the ends of an axis from which on it is logarithmic
+
+
+def draw_history(table: pd.DataFrame) -> Figure:
+    """Draw the score of every trial and the best one so far."""
+    figure, (axes,) = style.panels(2.9)
+    _draw_scores(axes, table, table["trial"], color=style.NEUTRAL)
+    colour = style.condition_colour(0)
+    axes.step(table["trial"], table["best"], where="post", color=colour, label="best so far")
+    axes.set(xlabel="trial", ylabel="score")
+    style.legend_below(figure, [axes], 2)
+    return figure
+
+
+def draw_slices(table: pd.DataFrame) -> Figure:
+    """Draw the score over each setting; later trials are darker."""
+    shown = [str(key) for key in table if key not in NUMBERS][:MOST_SETTINGS]
+    figure, panels = style.panels(2.3, len(shown), PER_LINE, 0.3, sharey=True)
+    look: dict[str, Any] = {"edgecolors": style.NEUTRAL, "linewidths": 0.4, "cmap": "Blues"}
+    for axes, key in zip(panels, shown, strict=True):
+        values = pd.to_numeric(table[key], errors="coerce")
+        if values[1:].isna().any():  # words
+            names = sorted(table[key][1:].unique())
+            values = table[key].map({name: k for k, name in enumerate(names)})
+            axes.set_xticks(range(len(names)), names)
+            axes.margins(x=0.2)
+        elif values.min() > 0.0 and values.max() > ORDERS * values.min():
+            axes.set_xscale("log")
+        _draw_scores(axes, table, values, c=table["trial"][1:], vmin=-len(table) / 2, **look)
+        axes.set_xlabel(key)
+        axes.set_ylabel("score" if style.begins_line(axes) else "")
+    style.legend_below(figure, panels, 1)
+    return figure
+
+
+def _draw_scores(axes: Axes, table: pd.DataFrame, places: Any, **look: Any) -> None:
+    """Draw the scores of trials; those far above that of the experiment as it is at the top."""
+    own, top = float(table["score"].iloc[0]), HIGHEST * float(table["score"].iloc[0])
+    for is_above, marker in ((False, "o"), (True, "^")):
+        rows = (table["trial"] > 0) & ((table["score"] > top) == is_above)
+        parts = {"c": look["c"][rows[1:]], "vmax": len(table)} if "c" in look else {}
+        scores = table["score"][rows].clip(upper=top)
+        axes.scatter(places[rows], scores, marker=marker, s=18, zorder=2, **{**look, **parts})
+    axes.axhline(own, color="black", linestyle="--", linewidth=0.8, label="the experiment as it is")
+
+
+def importance_table(importance: Mapping[str, float]) -> pd.DataFrame:
+    """Return columns setting, importance (shares that sum to 1), the largest first."""
+    return pd.DataFrame(
+        {"setting": list(importance), "importance": list(importance.values())}
+    ).sort_values("importance", ascending=False, ignore_index=True)
+
+
+def draw_importance(table: pd.DataFrame) -> Figure:
+    """Draw the importance of the settings as bars."""
+    figure, (axes,) = style.panels(0.3 * len(table) + 0.9)
+    places = np.arange(len(table))
+    axes.barh(places, table["importance"], color=style.condition_colour(0), height=0.6)
+    for place, share in zip(places, table["importance"], strict=True):
+        marks.beside(axes, place, f"{share:.2f}")
+    axes.set_yticks(places, table["setting"])
+    axes.set(xlabel="importance", xlim=(0.0, 1.0), ylim=(len(table) - 0.5, -0.5))
+    axes.grid(visible=False, axis="y")
     return figure

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import marks, style
+from evoexp.report.figures import Parts, Rows, groups, marks, style, table_of
 from evoexp.report.figures.marks import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
 from evoexp.report.statistics.inference import expected_effort, quantile, quantiles
@@ -32,22 +32,18 @@ ABOVE = 0.62  # [inch] of the bar of the critical difference and the axis' numbe
 NOTE: dict[str, Any] = {"ha": "center", "va": "center", "color": style.NEUTRAL, "fontsize": 7.5}
 
 
-def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> pd.DataFrame:
+@table_of()
+def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> Parts:
     """Return the share of (problem, target, run) that each planner has reached, over effort."""
     reached: dict[str, list[float]] = {}
     for own in runs:
         for longest in own.problem.targets:
             reached.setdefault(own.planner, []).extend(own.efforts(longest).tolist())
     axis = _axis(runs) if axis is None else axis
-    return pd.DataFrame(
-        {
-            "planner": planner,
-            "collision_queries": axis,
-            "share": [float(np.mean(np.array(own) <= x)) for x in axis],
-            "targets": len(own),
-        }
-        for planner, own in reached.items()
-    ).explode(["collision_queries", "share"], ignore_index=True)
+    for planner, efforts in reached.items():
+        shares = [float(np.mean(np.array(efforts) <= x)) for x in axis]
+        columns = {"planner": planner, "collision_queries": axis, "share": shares}
+        yield columns | {"targets": len(efforts)}
 
 
 def _axis(runs: Sequence[PlannerRuns]) -> FloatArray:
@@ -58,19 +54,18 @@ def _axis(runs: Sequence[PlannerRuns]) -> FloatArray:
     return np.geomspace(BEFORE * least, most, POINTS)
 
 
-def problem_share_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
+@table_of()
+def problem_share_table(runs: Sequence[PlannerRuns]) -> Parts:
     """Return the share of (target, run) that each planner has reached, problem by problem."""
-    parts, axis = [], _axis(runs)
+    axis = _axis(runs)
     for name in problem_order(runs):
         table = share_table([own for own in runs if own.problem.name == name], axis)
-        table.insert(0, "problem", name)
-        parts.append(table)
-    return pd.concat(parts, ignore_index=True)
+        yield {"problem": name, **table}
 
 
-def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
+@table_of()
+def length_table(runs: Sequence[PlannerRuns]) -> Parts:
     """Return median and quartiles over runs of the best proven length so far, of one problem."""
-    parts = []
     for own in runs:
         table, most = own.table, max(float(own.spent.max()), 2.0)
         least = float(table["collision_queries"].min()) if len(table) else 0.5 * most
@@ -79,9 +74,7 @@ def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
         best = np.array([own._replace(table=part).best_lengths for part in early])  # (points, runs)
         median, lower, upper = quantiles(best, (0.5, 0.25, 0.75))
         spread = {"median": median, "lower": lower, "upper": upper}
-        columns = {"planner": own.planner, "collision_queries": axis, **spread}
-        parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True)
+        yield {"planner": own.planner, "collision_queries": axis, **spread}
 
 
 def problem_order(runs: Iterable[PlannerRuns]) -> list[str]:
@@ -100,11 +93,10 @@ def draw_shares(table: pd.DataFrame) -> Figure:
 
 def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
     """Draw the shares of targets reached in one panel per problem."""
-    planners, problems = (list(table[name].unique()) for name in ("planner", "problem"))
-    shown = problems[:MAX_PANELS]
+    planners = list(table["planner"].unique())
+    shown = list(groups(table, "problem", in_order=False))[:MAX_PANELS]
     figure, panels = style.panels(1.9, len(shown), PER_LINE, 0.4)
-    for axes, problem in zip(panels, shown, strict=True):
-        own = table[table["problem"] == problem]
+    for axes, (problem, own) in zip(panels, shown, strict=True):
         _draw_share_curves(axes, own, planners)
         axes.set_title(style.shortened(problem, 34), fontweight="normal")
         if not (own["share"].astype(float) > 0.0).any():
@@ -129,8 +121,7 @@ def draw_lengths(table: pd.DataFrame) -> Figure:
     """Draw the best proven length so far of one problem."""
     figure, (axes,) = style.panels(3.6)
     table, planners = table.replace([np.inf], np.nan), list(table["planner"].unique())
-    for k, planner in enumerate(planners):
-        band = table[table["planner"] == planner]
+    for k, (_, band) in enumerate(groups(table, "planner", in_order=False)):
         x, low, high = (band[name] for name in ("collision_queries", "lower", "upper"))
         marks.band(axes, x, low, high, style.curve_look(k)["color"], step="post")
     draw_steps(axes, table, "collision_queries", "median", planners)
@@ -264,17 +255,15 @@ def alike(mean_ranks: Sequence[float], difference: float) -> list[tuple[int, int
     return groups
 
 
-def profiles_table(found: Standing) -> pd.DataFrame:
+@table_of("planner ratio share problems")
+def profiles_table(found: Standing) -> Rows:
     """Return the performance profile of each planner, at every ratio at which one rises."""
     ratios = effort_ratios(found.efforts)
     steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
     axis = np.append(steps, max(END * steps[-1], 2.0))
-    rows = [
-        (planner, x, np.count_nonzero(own <= x) / len(own), len(own))
-        for planner, own in zip(found.planners, ratios.T, strict=True)
-        for x in axis
-    ]
-    return pd.DataFrame(rows, columns=["planner", "ratio", "share", "problems"])
+    for planner, own in zip(found.planners, ratios.T, strict=True):
+        for x in axis:
+            yield planner, x, np.count_nonzero(own <= x) / len(own), len(own)
 
 
 def draw_profiles(table: pd.DataFrame) -> Figure:

@@ -4,7 +4,7 @@ Every table of bodies has one row per body and place; the functions that draw ne
 """
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from evoexp.numeric.convex_hull import hull_of
 from evoexp.playback.colours import OBJECT, OBSTACLE
 from evoexp.playback.recording import Outline, Recording, Shape
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, records, rounded, style
+from evoexp.report.figures import Parts, groups, records, rounded, style, table_of
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
@@ -38,25 +38,24 @@ SIZE = ["size_1", "size_2", "size_3"]
 COLUMNS = ["panel", "title", "element", "name", "arm", "kind", *SIZE, *POSE, "corners"]
 
 
-def scenes_table(shown: Sequence[tuple[str, Recording]]) -> pd.DataFrame:
+@table_of()
+def scenes_table(shown: Sequence[tuple[str, Recording]]) -> Parts:
     """Return bodies at start and goal, obstacles and ways of tools, a panel per (title, motion)."""
-    tables = []
     for panel, (title, recording) in enumerate(shown):
         rows = [
             *_bodies(recording, 0, "start"),
             *_bodies(recording, -1, "goal"),
             *_still(recording),
         ]
-        tables.append(_table(rows, panel, title, recording))
-    return pd.concat(tables, ignore_index=True)
+        yield _part(rows, panel, title, recording)
 
 
-def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.DataFrame:
+@table_of()
+def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> Parts:
     """Return the exact bodies of robots at their start, and the covers that the search tests.
 
     Those are rows (Pinocchio's joint, start, end, radius).
     """
-    tables = []
     for k, (title, recording, covers) in enumerate(shown):
         bodies = [row for row in _bodies(recording, 0, "body") if row["element"] == "body"]
         frames = recording.poses.world[0]
@@ -70,29 +69,30 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.Da
             here = np.asarray(pin.SE3ToXYZQUAT(place * pose))
             own.append(_row("cover", Shape("", joint - 1, here, drawn, "arm", 1), here))
         names = f"{title}: {len(bodies)} exact bodies", f"{len(own)} covers that the search tests"
-        tables.append(_table(bodies, 2 * k, names[0], recording))
-        tables.append(_table(own, 2 * k + 1, names[1], recording))
-    return pd.concat(tables, ignore_index=True)
+        yield _part(bodies, 2 * k, names[0], recording)
+        yield _part(own, 2 * k + 1, names[1], recording)
 
 
-def joints_table(recording: Recording) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def joints_table(recording: Recording) -> Parts:
     """Return all joints over a motion, with the robot's limits, infinite where there is none."""
-    model, tables = recording.parts[0].scene.model, []
+    model = recording.parts[0].scene.model
     limits = np.array([model.lowerPositionLimit, model.upperPositionLimit], dtype=np.float64).T
     limits = np.where(np.abs(limits) < NO_LIMIT, limits, np.copysign(np.inf, limits))
     for k, joint in enumerate(recording.joints):
         scale = 1.0 if joint.prismatic else 180.0 / np.pi
-        columns = {"instant": recording.times, "value": scale * recording.q[:, k]}
         low, high = scale * limits[k]
         unit = recording.length_unit if joint.prismatic else "deg"
-        tables.append(pd.DataFrame(columns).assign(joint=joint.name, unit=unit, low=low, high=high))
-    return rounded(pd.concat(tables, ignore_index=True))
+        columns = {"instant": recording.times, "value": scale * recording.q[:, k]}
+        yield columns | {"joint": joint.name, "unit": unit, "low": low, "high": high}
 
 
-def _table(rows: Iterable[dict[str, Any]], panel: int, title: str, own: Recording) -> pd.DataFrame:
+def _part(
+    rows: Iterable[dict[str, Any]], panel: int, title: str, own: Recording
+) -> Mapping[str, Any]:
     table = pd.DataFrame(list(rows)).assign(panel=panel, title=title)
-    table = table.reindex(columns=COLUMNS)
-    return rounded(table).assign(planar=own.view.planar, length_unit=own.length_unit)
+    table = rounded(table.reindex(columns=COLUMNS))
+    return dict(table.assign(planar=own.view.planar, length_unit=own.length_unit))
 
 
 def _bodies(recording: Recording, tick: int, element: str) -> Iterable[dict[str, Any]]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullLocator
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, records, style
+from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.comparisons import Comparison, Values
 from evoexp.report.statistics.inference import Proportion, quantile, spread
@@ -27,24 +27,22 @@ DOT: dict[str, Any] = {"color": style.ARM_COLOURS[0], "markersize": 5}
 OPEN: dict[str, Any] = {"markerfacecolor": "white"}  # the look of what is not significant
 
 
-def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
+@table_of()
+def values_table(results: Results, quantities: Mapping[str, Values]) -> Parts:
     """Return quantities (name with unit → values (done,), inf: never) of every replicate."""
-    parts = []
     for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
             columns = {"quantity": name, "position": position, "condition": c.label}
             runs = {"replicate": c.summaries.index, "value": values(c), "failed": len(c.failures)}
-            parts.append(pd.DataFrame(columns | runs))
-    return pd.concat(parts, ignore_index=True)
+            yield columns | runs
 
 
 def draw_values(table: pd.DataFrame) -> Figure:
     """Draw Tukey's boxes of all runs, the first condition on top."""
-    quantities = list(dict.fromkeys(table["quantity"]))
+    quantities = list(groups(table, "quantity", in_order=False))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     figure, panels = style.panels(0.32 * len(labels) + 1.1, len(quantities), sharey=True)
-    for axes, quantity in zip(panels, quantities, strict=True):
-        rows = table[table["quantity"] == quantity]
+    for axes, (quantity, rows) in zip(panels, quantities, strict=True):
         every = rows["value"].to_numpy()
         finite, never = every[np.isfinite(every)], None
         if np.isposinf(every).any():  # infinity is drawn beyond all finite values
@@ -69,8 +67,7 @@ def draw_values(table: pd.DataFrame) -> Figure:
             axes.axvline(between, color=style.FAINT, linewidth=0.7, linestyle=(0, (1, 2)))
             place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "fontsize": 6.5}
             axes.annotate("never", (never, 1.0), ha="center", va="bottom", **place)
-    by_position = table[table["quantity"] == quantities[0]].groupby("position")
-    counts = by_position.agg(n=("value", "size"), failed=("failed", "max"))
+    counts = quantities[0][1].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
     names = [
         f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})"
         for k, n, failed in counts.itertuples()
@@ -118,26 +115,21 @@ def draw_box(
         axes.plot(drawn, beside, "o", color=colour, **POINT)
 
 
-def effects_table(
-    comparisons: Mapping[str, Sequence[Comparison]], significance: float
-) -> pd.DataFrame:
+@table_of("quantity condition a12 lower upper p_adjusted runs runs_other significance")
+def effects_table(comparisons: Mapping[str, Sequence[Comparison]], significance: float) -> Rows:
     """Return how often the first condition is better than each other one, by quantity."""
-    rows = [
-        (name, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, *c.sizes)
-        for name, found in comparisons.items()
-        for c in found
-    ]
-    names = ["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]
-    return pd.DataFrame(rows, columns=names).assign(significance=significance)
+    for name, found in comparisons.items():
+        for c in found:
+            better = c.better.a12, *c.better.interval, c.p_adjusted
+            yield name, c.quantity, *better, *c.sizes, significance
 
 
 def draw_effects(table: pd.DataFrame) -> Figure:
     """Draw A12 with its interval, one row per other condition, one panel per quantity."""
-    quantities = list(dict.fromkeys(table["quantity"]))
+    quantities = list(groups(table, "quantity", in_order=False))
     labels = list(dict.fromkeys(table["condition"]))
     figure, panels = style.panels(0.3 * len(labels) + 1.2, len(quantities), sharey=True)
-    for axes, quantity in zip(panels, quantities, strict=True):
-        rows = table[table["quantity"] == quantity]
+    for axes, (quantity, rows) in zip(panels, quantities, strict=True):
         y = np.array([labels.index(label) for label in rows["condition"]])
         a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
         marks.dashed(axes, 0.5)
@@ -163,33 +155,31 @@ MARGIN = 0.08  # [-] of the panels' span, beyond the intervals
 NEARLY_ALL = 60.0  # [%] a span from which on the axis has a number at every quarter
 
 
+@table_of("quantity position condition having total share lower upper printed")
 def shares_table(
     rows: Sequence[tuple[str, int, str, Proportion]],
     printed: Mapping[str, float],
     confidence: float,
-) -> pd.DataFrame:
+) -> Rows:
     """Return shares of runs with Wilson's intervals, and the printed shares, by quantity.
 
     The rows are (quantity, position, condition, how many).
     """
-    names = ["quantity", "position", "condition", "having", "total", "share", "lower", "upper"]
-    table = pd.DataFrame(
-        [(*given, *p, p.share, *p.interval(confidence)) for *given, p in rows], columns=names
-    )
-    return table.assign(printed=table["quantity"].map(dict(printed)).astype("float64"))
+    for name, position, label, p in rows:
+        shares = p.share, *p.interval(confidence), printed.get(name, np.nan)
+        yield name, position, label, *p, *shares
 
 
 def draw_shares(table: pd.DataFrame) -> Figure:
     """Draw one panel per quantity, one row per condition, in one scale [%]."""
-    quantities = list(dict.fromkeys(table["quantity"]))
+    quantities = list(groups(table, "quantity", in_order=False))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}
     figure, panels = style.panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
     known = 100 * table.loc[table["total"] > 0, ["lower", "upper", "printed"]].to_numpy(np.float64)
     low, high = (np.nanmin(known), np.nanmax(known)) if known.size else (0.0, 100.0)
     beyond = MARGIN * max(high - low, 1.0)
-    for axes, quantity in zip(panels, quantities, strict=True):
-        every = table[table["quantity"] == quantity]
+    for axes, (quantity, every) in zip(panels, quantities, strict=True):
         for position, rows in groups(every, "position"):
             colour, y = style.row_colour(int(position), len(labels)), rows_of[position]
             if rows["total"].iloc[0]:
@@ -219,12 +209,12 @@ MARKS: dict[str, dict[str, Any]] = {
 }
 
 
-def specification_table(judged: Sequence[Any], headline: Any) -> pd.DataFrame:
+@table_of("family reading default quantity value low high neutral verdict")
+def specification_table(judged: Sequence[Any], headline: Any) -> Rows:
     """Return one row per reading of a headline claim, of `judged_claims.Judged`.
 
     Where a rule has no number that decides, the row holds median and quartiles of the quantity.
     """
-    rows = []
     for one in judged:
         if one.headline is headline:
             size, name = one.claim.size, headline.quantity
@@ -233,9 +223,7 @@ def specification_table(judged: Sequence[Any], headline: Any) -> pd.DataFrame:
                 name, numbers = size.name, (size.value, size.low, size.high, size.neutral)
             shipped, reading = one.family.shipped, one.family.reading(one.condition)
             given = shipped.label, reading, one.condition is shipped, name
-            rows.append((*given, *numbers, one.claim.verdict))
-    names = ["family", "reading", "default", "quantity", "value", "low", "high", "neutral"]
-    return pd.DataFrame(rows, columns=[*names, "verdict"])
+            yield *given, *numbers, one.claim.verdict
 
 
 def draw_specification(table: pd.DataFrame) -> Figure:

@@ -81,9 +81,8 @@ ranks = effort_curves.standing
 compared_conditions = stored_conditions
 
 
-def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
-    """Return the conditions that have motions, rated by their proven answers."""
-    rows = []
+def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> Iterator[Rated]:
+    """Yield the conditions that have motions, rated by their proven answers."""
     for own in runs:
         effort, reached = own.first_reached()
         levels = settings.confidence, settings.num_resamples
@@ -103,8 +102,7 @@ def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
             refuted=own.condition.verdicts.solved_refuted if own.condition else 0,
             judged=own.condition.verdicts.judged if own.condition else 0,
         )
-        rows.append(row if own.condition is None else _with_coins(row, own, own.condition))
-    return rows
+        yield row if own.condition is None else _with_coins(row, own, own.condition)
 
 
 def _with_coins(row: Rated, own: PlannerRuns, condition: ConditionResults) -> Rated:

@@ -309,11 +309,10 @@ def _under(word: str, counts: Counter[str]) -> str:
     return f"under all {total} readings" if having == total else f"under {having} of {total}"
 
 
-def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
-    """Return all verdicts, one row per condition: in the first family it is of."""
+def headline_rows(judged: Sequence[Judged]) -> Iterator[tuple[object, ...]]:
+    """Yield all verdicts, one row per condition: in the first family it is of."""
     first = {one.condition: one.family for one in reversed(judged)}
     headlines = dict.fromkeys(one.headline for one in judged)
-    rows = list[tuple[object, ...]]()
     for condition in dict.fromkeys(one.condition for one in judged):
         family = first[condition]
         own = {
@@ -325,12 +324,11 @@ def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
         changed = dict(family.varied).get(condition, ())
         cells = (own.get(headline, "–") for headline in headlines)
         names = ", ".join(f"`{name}`" for name in changed) or AS_READ
-        rows.append((condition.label, names, condition.done, *cells))
-    return rows
+        yield condition.label, names, condition.done, *cells
 
 
-def assumed_rows(read_results: Results, families: Sequence[Family]) -> list[tuple[object, ...]]:
-    """Return every assumed number, with the conditions that vary it."""
+def assumed_rows(read_results: Results, families: Sequence[Family]) -> Iterator[tuple[object, ...]]:
+    """Yield every assumed number, with the conditions that vary it."""
     # name of a setting, or of a list of settings → its entries; entry → the varying conditions
     lists: dict[str, dict[Parameter, list[str]]] = {}
     for family in families:
@@ -340,7 +338,6 @@ def assumed_rows(read_results: Results, families: Sequence[Family]) -> list[tupl
                 by = [c.label for c, changed in family.varied if names & set(changed)]
                 entries = lists.setdefault(_INDEX.sub("[…]", parameter.name), {})
                 entries.setdefault(parameter, []).extend(by)
-    rows = list[tuple[object, ...]]()
     for name, entries in lists.items():
         values = list(dict.fromkeys(p.value for p in entries))
         reasons = dict.fromkeys(p.source.removeprefix(ASSUMED).lstrip(": ") for p in entries)
@@ -349,8 +346,7 @@ def assumed_rows(read_results: Results, families: Sequence[Family]) -> list[tupl
         units = dict.fromkeys(p.unit for p in entries)
         reason = "; ".join(filter(None, reasons)) or "–"
         by_label = "; ".join(varied) or "not varied"
-        rows.append((f"`{name}`", shown, ", ".join(filter(None, units)) or "–", reason, by_label))
-    return rows
+        yield f"`{name}`", shown, ", ".join(filter(None, units)) or "–", reason, by_label
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {

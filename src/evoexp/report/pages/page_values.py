@@ -25,6 +25,11 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "evaluations_per_second": lambda condition: (
         condition.column("evaluations") / search_seconds(condition)
     ),
+    # motions that the exact verdict proves free, and further apart than required, of those judged
+    "free": lambda condition: Proportion(condition.verdicts.certified, condition.verdicts.judged),
+    "with_margin": lambda condition: Proportion(
+        condition.verdicts.with_margin, condition.verdicts.judged
+    ),
     # the quantities of a figure, without those that no run has
     "known": lambda of, results: {
         name: values
@@ -93,9 +98,8 @@ EFFORTS: dict[str, comparisons.Values] = {  # quantities that every planner reco
 }
 SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
     "solved": success,
-    # of the motions that the exact verdict judged
-    "certified": lambda c: Proportion(c.verdicts.certified, c.verdicts.judged),
-    "required margin kept": lambda c: Proportion(c.verdicts.with_margin, c.verdicts.judged),
+    "certified": PAGE_VALUES["free"],
+    "required margin kept": PAGE_VALUES["with_margin"],
 }
 
 
@@ -118,17 +122,15 @@ def _pairs(results: Results) -> list[comparisons.Pair]:
 
 def pairs_of_conditions(
     results: Results, settings: ReportSettings, differing: dict[str, comparisons.Values]
-) -> tuple[tuple[str, tuple[comparisons.Comparison, ...]], ...]:
+) -> Iterator[tuple[str, tuple[comparisons.Comparison, ...]]]:
     """Compare pairs in every quantity in which they differ; p-values are adjusted within each."""
     of = "pairs of conditions"
     if len(results.evolved) > MOST_PAIRED:
         of = f"{results.evolved[0].label} against each other condition"
     pairs, named = _pairs(results), comparisons.AGAINST
-    found = {
-        f"{name}: {of}": comparisons.compared(pairs, values, settings, named=named)
-        for name, values in differing.items()
-    }
-    return tuple((heading, rows) for heading, rows in found.items() if rows)
+    for name, values in differing.items():
+        if rows := comparisons.compared(pairs, values, settings, named=named):
+            yield f"{name}: {of}", rows
 
 
 def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ...]]:
@@ -139,9 +141,8 @@ def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ..
     ]
 
 
-def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]]:
-    """Return how far shares differ from each other; no row of one that is the same everywhere."""
-    rows: list[tuple[str, ...]] = []
+def difference_rows(results: Results, confidence: float) -> Iterator[tuple[str, ...]]:
+    """Yield how far shares differ from each other; no row of one that is the same everywhere."""
     for name, of in SHARES.items():
         found = [(a, b, of(a), of(b)) for a, b in _pairs(results) if of(a).total and of(b).total]
         if len({p.share for _, _, *both in found for p in both}) < 2:
@@ -152,8 +153,7 @@ def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]
             difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
             points = f"{difference} [{low}, {high}]".replace("-", "−")
             tests = markdown.p_value(p), markdown.p_value(adjusted)
-            rows.append((name, comparisons.AGAINST(a, b), points, *tests))
-    return rows
+            yield name, comparisons.AGAINST(a, b), points, *tests
 
 
 JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from evoexp.report.figures import records
+from evoexp.report.figures import Rows, records, table_of
 from evoexp.report.pages import markdown
 from evoexp.report.results.run_measures import certified, search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -74,16 +74,14 @@ def sweep_of(results: Results) -> Sweep | None:
     return Sweep(names.pop(), tuple(swept))
 
 
-def main_effects(
-    sweep: Sweep, values: Values, confidence: float, num_resamples: int
-) -> pd.DataFrame:
+@table_of("base setting first other pairs difference low high better")
+def main_effects(sweep: Sweep, values: Values, confidence: float, num_resamples: int) -> Rows:
     """Return each value of a setting against its first one, all else and seeds being equal.
 
     Columns base (the swept condition), setting, first, other (its values), pairs (of runs),
     difference (median of the other's minus the first's), low, high (its interval, by resampling
     seeds), better (share of pairs in which the other is lower; ties count half).
     """
-    rows = []
     for base, (k, setting) in itertools.product(sweep.bases, enumerate(sweep.settings)):
         first, *others = sweep.levels(k)
         for other in others:
@@ -97,9 +95,7 @@ def main_effects(
             better = float((known < 0.0).mean() + 0.5 * (known == 0.0).mean())
             ends = inference.percentiles(medians, confidence)
             numbers = len(known), inference.quantile(known, 0.5), *ends, better
-            rows.append((base, setting, first, other, *numbers))
-    names = ["base", "setting", "first", "other", "pairs", "difference", "low", "high", "better"]
-    return pd.DataFrame(rows, columns=names)
+            yield base, setting, first, other, *numbers
 
 
 def _pairs(

@@ -74,14 +74,13 @@ def joint_positions(
         numbers[link.arm] += 1
 
 
-def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
-    """Return the closed outlines of obstacles as seen along z, each (points, 2).
+def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> Iterator[FloatArray]:
+    """Yield the closed outlines of obstacles as seen along z, each (points, 2).
 
     A half-space is a strip of length `reach` to both sides of its point, a tenth of it deep.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
-    outlines = []
     for kind, center, rotation, size in zip(*table, strict=True):
         matrix = rotation.reshape(3, 3)
         if kind == BOX:
@@ -109,8 +108,7 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
                 first = int(np.argmax(np.diff(circle @ along >= 0.0))) + 1
                 outline = np.roll(outline[:-1], -first, axis=0)
                 outline = np.vstack([outline, outline[:1]])
-        outlines.append(outline + center[:2])
-    return outlines
+        yield outline + center[:2]
 
 
 class BodyDistance:

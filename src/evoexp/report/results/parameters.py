@@ -150,44 +150,34 @@ def _component(group: str, config: dict[str, Any], taken: dict[str, Option]) -> 
     where = taken[group].source if group in taken else NOT_RECORDED
     entries = _entries(group, "", taken)
     otherwise = OVERRIDE if entries else where  # of a setting that the option does not have
+
+    def parts(key: str, value: Any, is_of_file: bool = False) -> Iterator[Parameter]:
+        """Yield a setting, part by part; lists of plain values are one part.
+
+        `is_of_file` tells that it stands beside the hash of a file, and may be the file's content.
+        """
+        reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
+        if reference and isinstance(value, dict):
+            yield from _component(reference[1], value, taken)
+        elif isinstance(value, dict):
+            for name, item in value.items():
+                if name not in (TARGET, "revision"):
+                    yield from parts(f"{key}.{name}", item, FILE in value)
+        elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+            for k, item in enumerate(value):
+                yield from parts(f"{key}[{k}]", item, is_of_file)
+        else:
+            is_unknown = key not in entries and (is_of_file or key.endswith(f".{SHA256}"))
+            unknown = OF_FILE if is_unknown else otherwise
+            yield _parameter(f"{group}.{key}", value, entries.get(key), unknown)
+        items = {path[len(key) :].split("]")[0] for path in entries if path.startswith(f"{key}[")}
+        if isinstance(value, list) and len(items) > len(value):  # a list cut short
+            yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
+
     yield Parameter(group, f"{config[TARGET]}, revision {config.get('revision')}", "", where)
     for key, value in config.items():
         if key not in (TARGET, "revision"):
-            yield from _setting(group, key, value, entries, otherwise, taken)
-
-
-def _setting(
-    group: str,
-    key: str,
-    value: Any,
-    entries: dict[str, Entry],
-    otherwise: str,
-    taken: dict[str, Option],
-    is_of_file: bool = False,
-) -> Iterator[Parameter]:
-    """Yield a setting, part by part; lists of plain values are one part.
-
-    `is_of_file` tells that it stands beside the hash of a file, and so may be the file's content.
-    """
-    reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
-    if reference and isinstance(value, dict):
-        yield from _component(reference[1], value, taken)
-    elif isinstance(value, dict):
-        for name, item in value.items():
-            if name not in (TARGET, "revision"):
-                inner = f"{key}.{name}", item, entries, otherwise, taken, FILE in value
-                yield from _setting(group, *inner)
-    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
-        for k, item in enumerate(value):
-            inner = f"{key}[{k}]", item, entries, otherwise, taken, is_of_file
-            yield from _setting(group, *inner)
-    else:
-        is_unknown = key not in entries and (is_of_file or key.endswith(f".{SHA256}"))
-        unknown = OF_FILE if is_unknown else otherwise
-        yield _parameter(f"{group}.{key}", value, entries.get(key), unknown)
-    items = {path[len(key) :].split("]")[0] for path in entries if path.startswith(f"{key}[")}
-    if isinstance(value, list) and len(items) > len(value):  # a list cut short
-        yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
+            yield from parts(key, value)
 
 
 def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Parameter:

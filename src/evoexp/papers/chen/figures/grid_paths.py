@@ -14,7 +14,7 @@ from evoexp.papers.chen import path_claims
 from evoexp.papers.chen.path_claims import Group, Routes, above_known, cost_known, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, style
+from evoexp.report.figures import Rows, groups, marks, style, table_of
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import PlayedRun
 from evoexp.report.results.run_measures import counted
@@ -52,18 +52,16 @@ def known_lines(group: Group) -> list[Line]:
     return [Line(MEDIAN, path_claims.median_path(group.main)), *best]
 
 
-def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
+@table_of("panel unit kind text number share x y")
+def paths_table(panels: Sequence[Panel]) -> Rows:
     """Return obstacles and paths."""
-    rows: list[tuple[object, ...]] = []
     for title, c, lines in panels:
         head = title, c.length_unit
         for number, (x0, y0, x1, y1) in enumerate(c.scenario.obstacles):
-            rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
+            yield from ((*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1)))
         for number, line in enumerate(lines):
             same = (*head, line.kind, line.text, number, line.share)
-            rows += [(*same, x, y) for x, y in line.path.tolist()]
-    names = ["panel", "unit", "kind", "text", "number", "share", "x", "y"]
-    return pd.DataFrame(rows, columns=names)
+            yield from ((*same, x, y) for x, y in line.path.tolist())
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
@@ -119,18 +117,16 @@ def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
     return figure, panels
 
 
-def places_table(shown: Sequence[Group]) -> pd.DataFrame:
+@table_of("position condition unsafeness nodes runs")
+def places_table(shown: Sequence[Group]) -> Rows:
     """Count the nodes of every unsafeness on the paths of each first condition."""
-    rows: list[tuple[object, ...]] = []
     for position, group in enumerate(shown):
         fields, found = group.main.problem(Problem).fields, paths(group.main).values()
         unsafeness = np.asarray(fields.grid.inner(fields.unsafeness))  # (along x, along y)
         passed = np.concatenate([unsafeness[tuple(path.astype(int).T)] for path in found])
-        rows += [
-            (position, group.name, float(value), (passed == value).sum() / len(found), len(found))
-            for value in np.unique(unsafeness)
-        ]
-    return pd.DataFrame(rows, columns=["position", "condition", "unsafeness", "nodes", "runs"])
+        for value in np.unique(unsafeness):
+            nodes = (passed == value).sum() / len(found)
+            yield position, group.name, float(value), nodes, len(found)
 
 
 def draw_places(table: pd.DataFrame) -> Figure:
@@ -152,9 +148,9 @@ def draw_places(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
+@table_of("panel position condition quantity generation median lower upper")
+def costs_table(found: tuple[Group, ...]) -> Rows:
     """Return median and quartiles of costs over replicates by weighting, condition, generation."""
-    rows: list[tuple[object, ...]] = []
     for group in found:
         for position, c in enumerate(group.conditions):
             columns: dict[str, Any] = {"best so far": "best_cost"} | (
@@ -164,12 +160,10 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
                 for generation, own in c.generations.groupby("index"):
                     median, lower, upper, _ = spread(own[column].to_numpy(dtype=np.float64))
                     given = group.title, position, _name(c, group), name, generation
-                    rows.append((*given, median, lower, upper))
+                    yield *given, median, lower, upper
         if group.truth is not None:
             known = (KNOWN, cost_known(group.truth)), (BOUND, path_claims.bound_known(group.truth))
-            rows += [(group.title, -1, name, name, 0, *(value,) * 3) for name, value in known]
-    names = ["panel", "position", "condition", "quantity", "generation"]
-    return pd.DataFrame(rows, columns=[*names, "median", "lower", "upper"])
+            yield from ((group.title, -1, name, name, 0, *(value,) * 3) for name, value in known)
 
 
 def draw_costs(table: pd.DataFrame) -> Figure:
@@ -194,17 +188,15 @@ def draw_costs(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
+@table_of("panel position condition replicate gap_percent bound_percent")
+def gaps_table(found: tuple[Group, ...]) -> Rows:
     """Return every run's gap to the best path known."""
-    rows = [
-        (group.title, position, _name(c, group), replicate, gap, 100.0 * (bound / known - 1.0))
-        for group in found
-        for known, bound in ((cost_known(group.truth), path_claims.bound_known(group.truth)),)
-        for position, c in enumerate(group.conditions)
-        for replicate, gap in zip(c.summaries.index, above_known(c, known), strict=True)
-    ]
-    names = ["panel", "position", "condition", "replicate", "gap_percent", "bound_percent"]
-    return pd.DataFrame(rows, columns=names)
+    for group in found:
+        known, bound = cost_known(group.truth), path_claims.bound_known(group.truth)
+        for position, c in enumerate(group.conditions):
+            for replicate, gap in zip(c.summaries.index, above_known(c, known), strict=True):
+                given = group.title, position, _name(c, group), replicate
+                yield *given, gap, 100.0 * (bound / known - 1.0)
 
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
@@ -260,16 +252,14 @@ def same_problems(groups: tuple[Group, ...]) -> Iterator[tuple[object, ...]]:
             yield one, two, ratios, len(own & other), nodes, 100.0 * exchanged
 
 
-def route_panels(groups: tuple[Group, ...], route_list: Routes) -> list[Panel]:
-    """Return one path per route of every weighting."""
-    panels = []
+def route_panels(groups: tuple[Group, ...], route_list: Routes) -> Iterator[Panel]:
+    """Yield one path per route of every weighting."""
     for group in groups:
         c, lines = group.main, list[Line]()
         for name, members in path_claims.routes_of(c, route_list).items():
             path, count = path_claims.median_path(c, members), len(members)
             lines.append(Line(name, path, count / c.done, f"{name}: {count} of {c.done}"))
-        panels.append((group.title, c, lines))
-    return panels
+        yield group.title, c, lines
 
 
 def lingering(group: Group, groups: tuple[Group, ...]) -> str:

@@ -19,11 +19,11 @@ from evoexp.papers import trails
 from evoexp.papers.chen.docking_postures import CLOSE, METHODS, Case
 from evoexp.papers.chen.figures import grid_paths
 from evoexp.planners.two_stage.planner import Problem
-from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
 from evoexp.report.pages import markdown
 from evoexp.report.results.run_measures import median_replicate
 from evoexp.report.results.stored_results import ConditionResults
-from evoexp.report.statistics.inference import Proportion, quantiles
+from evoexp.report.statistics.inference import quantiles
 
 RUNS = ("GA", "GA, elitism", "random search")
 ORDER = (*RUNS, *METHODS)  # the place of a method gives its colour
@@ -64,9 +64,9 @@ def _colour(method: str) -> str:
     return style.condition_colour(ORDER.index(method)) if method in ORDER else style.NEUTRAL
 
 
-def fitness_table(cases: list[Case]) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def fitness_table(cases: list[Case]) -> Parts:
     """Return median and quartiles over runs of the best fitness f = E_m − E so far."""
-    parts = []
     for panel, case in enumerate(cases):
         quantity, sign = "fitness f", -1.0
         offset = float(case.conditions[0].planner.objective.greatest)
@@ -85,8 +85,7 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
             columns |= dict(zip(("median", "lower", "upper"), spreads, strict=True))
             (columns["average"],) = quantiles(mean, (0.5,))
             columns["runs"] = rows.groupby("index").size().to_numpy()
-            parts.append(pd.DataFrame(columns | {"optimum": offset + sign * case.least}))
-    return rounded(pd.concat(parts, ignore_index=True))
+            yield columns | {"optimum": offset + sign * case.least}
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
@@ -112,17 +111,16 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def gaps_table(cases: list[Case]) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def gaps_table(cases: list[Case]) -> Parts:
     """Return the gap of every run, and of every start of a conventional method, to the optimum."""
-    parts = []
     for panel, case in enumerate(cases):
         costs = {method: c.column("best_cost") for method, c in case.evolved.items()}
         costs |= {method: ends[:, 2] for method, ends in case.ends().items()}
         for method, values in costs.items():
             columns: dict[str, Any] = {"panel": panel, "case": case.name, "method": method}
-            columns |= {"at": ORDER.index(method), "gap": np.maximum(case.gaps(values), 0.0)}
-            parts.append(pd.DataFrame(columns))
-    return rounded(pd.concat(parts, ignore_index=True))
+            gaps = np.maximum(case.gaps(values), 0.0)
+            yield columns | {"at": ORDER.index(method), "gap": gaps}
 
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
@@ -142,9 +140,9 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def postures_table(cases: list[Case]) -> pd.DataFrame:
+@table_of("panel case element posture x y x_end y_end size", is_rounded=True)
+def postures_table(cases: list[Case]) -> Rows:
     """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles."""
-    rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
         scenario, robot = case.conditions[0].scenario, case.conditions[0].robot
         own: list[tuple[Any, ...]] = [
@@ -171,9 +169,7 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
             own.append(("platform", posture, x - length, y - height, x + length, y + height, 0.0))
             ends = enumerate(pairwise(joints), 1)
             own += [("link", posture, *start, *end, float(k)) for k, (start, end) in ends]
-        rows += [(panel, case.name, *row) for row in own]
-    names = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
-    return rounded(pd.DataFrame(rows, columns=names))
+        yield from ((panel, case.name, *row) for row in own)
 
 
 def draw_postures(table: pd.DataFrame) -> Figure:
@@ -205,9 +201,9 @@ def draw_postures(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def landscape_table(cases: list[Case]) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def landscape_table(cases: list[Case]) -> Parts:
     """Return E over the angles, and the points that are marked."""
-    parts = []
     for panel, case in enumerate(cases):
         assert case.landscape is not None
         one, two, cost = (case.landscape.array(name) for name in ("theta_1", "theta_2", "cost"))
@@ -228,8 +224,7 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
         for element, (angles, costs) in ({GRID: (grid, cost.ravel())} | marked).items():
             columns: dict[str, Any] = {"panel": panel, "case": case.name, "element": element}
             columns |= dict(zip(ANGLES, angles.T, strict=True))
-            parts.append(pd.DataFrame(columns | {"cost": costs}))
-    return rounded(pd.concat(parts, ignore_index=True))
+            yield columns | {"cost": costs}
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:
@@ -267,9 +262,9 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
+@table_of("row unit kind number a b")
+def missions_table(shown: Sequence[ConditionResults]) -> Rows:
     """Return the run of median cost of every condition, with everything that is drawn of it."""
-    rows: list[tuple[object, ...]] = []
     for c in shown:
         replicate = median_replicate(c, c.column("best_cost"))
         q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
@@ -294,8 +289,7 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
             (FORCE, 0, [scenario.docking.force]),
         ]
         given = told, c.length_unit
-        rows += [(*given, *kind, a, b) for *kind, points in kinds for a, b in points]
-    return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
+        yield from ((*given, *kind, a, b) for *kind, points in kinds for a, b in points)
 
 
 def draw_missions(table: pd.DataFrame) -> Figure:
@@ -337,8 +331,6 @@ def draw_missions(table: pd.DataFrame) -> Figure:
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
-    # motions of a condition that are free of contact, of those judged
-    "free": lambda condition: Proportion(condition.verdicts.certified, condition.verdicts.judged),
     "free_interval": lambda free, confidence: markdown.percent(free.interval(confidence)),
     # the pair of bodies that is closest in most runs
     "closest": lambda condition: condition.summaries["clearance_pair"].value_counts().index[0],

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, records, style
+from evoexp.report.figures import Rows, groups, records, style, table_of
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.judging import Judge
@@ -65,24 +65,22 @@ def rows_of(values: FloatArray, blocked: np.ndarray, edge: str = BLOCKED) -> lis
     return [[str(word) for word in row] for row in words.T[::-1]]
 
 
-def compare(
-    name: str, computed: Sequence[Sequence[str]], given: Sequence[Sequence[str]]
-) -> pd.DataFrame:
+@table_of("field row column computed printed slip")
+def compare(name: str, computed: Sequence[Sequence[str]], given: Sequence[Sequence[str]]) -> Rows:
     """Compare a computed grid with a printed one, cell by cell.
 
     A slip is empty, `wrong`, `missing` (nothing is printed for the cell) or `surplus` (printed
     before the column, and belongs to no cell).
     """
-    found: list[tuple[object, ...]] = []
     for row, (own, theirs) in enumerate(zip(computed, given, strict=True)):
         opcodes = difflib.SequenceMatcher(None, theirs, own, autojunk=False).get_opcodes()
         for kind, i1, i2, j1, j2 in opcodes:
             both = min(i2 - i1, j2 - j1)
             slip = "" if kind == "equal" else WRONG
-            found += [(name, row, j1 + k, own[j1 + k], theirs[i1 + k], slip) for k in range(both)]
-            found += [(name, row, j, own[j], "", MISSING) for j in range(j1 + both, j2)]
-            found += [(name, row, j2, "", theirs[i], SURPLUS) for i in range(i1 + both, i2)]
-    return pd.DataFrame(found, columns=["field", "row", "column", "computed", "printed", "slip"])
+            for k in range(both):
+                yield name, row, j1 + k, own[j1 + k], theirs[i1 + k], slip
+            yield from ((name, row, j, own[j], "", MISSING) for j in range(j1 + both, j2))
+            yield from ((name, row, j2, "", theirs[i], SURPLUS) for i in range(i1 + both, i2))
 
 
 def draw_fields(table: pd.DataFrame) -> Figure:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
-from evoexp.report.figures import groups, marks, style
+from evoexp.report.figures import Parts, Rows, groups, marks, style, table_of
 from evoexp.report.results.run_measures import solved
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
@@ -22,7 +22,7 @@ from evoexp.report.statistics.inference import Proportion, quantiles
 SHARE, EFFORT, RATIO = "share", "effort", "ratio"
 NUMBERS = "abcdef"
 APART = 0.035  # [-] of a value, by which neighbouring series are set apart on the logarithmic axis
-NAMES = ["quantity", "kind", "position", "task", "value", "expected", "lower", "upper"]
+NAMES = "quantity kind position task value expected lower upper "
 RESIDUAL, CYCLES, POINT = "residual", "cycles", "point"
 PROPORTIONAL: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.1, "linestyle": ":"}
 DISTANCE, COST = "distance to the goal", "cost"
@@ -32,39 +32,37 @@ VISIBLE = 1e-6  # [length unit] smaller tolerances are not drawn
 TOLERANCE: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 
 
+@table_of(NAMES + "having total")
 def effort_table(
     found: tuple[Task, ...],
     shares: Mapping[str, Callable[[ConditionResults], Proportion]],
     effort: Mapping[str, Values],
     confidence: float,
     num_resamples: int,
-) -> pd.DataFrame:
+) -> Rows:
     """Return shares of runs with Wilson's intervals, and expected running times, by their names."""
     points = [
         (position, task.name, value, c)
         for position, task in enumerate(found)
         for value, c in task.by_value.items()
     ]
-    rows: list[tuple[object, ...]] = []
     for name, count in shares.items():
         for *given, c in points:
             met = count(c)
-            rows.append((name, SHARE, *given, met.share, *met.interval(confidence), *met))
+            yield name, SHARE, *given, met.share, *met.interval(confidence), *met
     for name, values in effort.items():
         for *given, c in points:
             runs = values(c), solved(c)
             interval = inference.expected_interval(*runs, confidence, num_resamples)
             expected = inference.expected_effort(*runs), *interval
-            rows.append((name, EFFORT, *given, *expected, c.solved, c.done))
-    return pd.DataFrame(rows, columns=[*NAMES, "having", "total"])
+            yield name, EFFORT, *given, *expected, c.solved, c.done
 
 
 def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
     """Draw one panel per quantity; a value without a success has no point."""
-    quantities, keys = list(dict.fromkeys(table["quantity"])), _keys(table)
+    quantities, keys = list(groups(table, "quantity", in_order=False)), _keys(table)
     figure, panels = style.panels(2.6, len(quantities), 2, 0.7)
-    for axes, number, quantity in zip(panels, NUMBERS, quantities, strict=False):
-        own = table[table["quantity"] == quantity]
+    for axes, number, (quantity, own) in zip(panels, NUMBERS, quantities, strict=False):
         _draw_series(axes, own, len(keys), marked)
         share = own["kind"].iloc[0] == SHARE
         title = f"{number}  {quantity.split(' [')[0]}{'' if share else ' per success'}"
@@ -74,27 +72,25 @@ def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
     return figure
 
 
+@table_of(NAMES + "bound reference")
 def ratios_table(
     rows: Mapping[str, Sequence[Any]], found: tuple[Task, ...], reference: float
-) -> pd.DataFrame:
+) -> Rows:
     """Return the effort of every value over that of the recommended one."""
     names = [task.name for task in found]
-    ratios = [
-        (metric, RATIO, names.index(r.task), r.task, r.value, r.ratio, *r.interval, r.bound)
-        for metric, own in rows.items()
-        for r in own
-    ]
-    return pd.DataFrame(ratios, columns=[*NAMES, "bound"]).assign(reference=reference)
+    for metric, own in rows.items():
+        for r in own:
+            numbers = r.value, r.ratio, *r.interval, r.bound, reference
+            yield metric, RATIO, names.index(r.task), r.task, *numbers
 
 
 def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
     """Draw one panel per metric; a ratio of 0 or ∞ (one of the two never succeeds) has no point."""
-    quantities, reference = list(dict.fromkeys(table["quantity"])), table["reference"].iloc[0]
-    count = table["position"].nunique()
+    quantities = list(groups(table, "quantity", in_order=False))
+    reference, count = table["reference"].iloc[0], table["position"].nunique()
     keys = _keys(table[(table["expected"] > 0.0) & np.isfinite(table["expected"])])
     figure, panels = style.panels(3.3, len(quantities), sharey=True)
-    for axes, number, quantity in zip(panels, NUMBERS, quantities, strict=False):
-        own = table[table["quantity"] == quantity]
+    for axes, number, (quantity, own) in zip(panels, NUMBERS, quantities, strict=False):
         _draw_series(axes, own[own["expected"] > 0.0], count, float(reference))
         axes.axhline(1.0, color=style.NEUTRAL, linewidth=0.9)
         bounds = own[own["bound"] != 1.0].drop_duplicates("value").sort_values("value")
@@ -148,22 +144,17 @@ def _keys(table: pd.DataFrame) -> list[Line2D]:
     return [style.key(name, **_look(position)) for position, name in tasks]
 
 
-def floor_table(found: Sequence[Task]) -> pd.DataFrame:
+@table_of("position task quantity scope median lower upper runs slope length_unit")
+def floor_table(found: Sequence[Task]) -> Rows:
     """Return residual distances and cycles per kind of goal and scope."""
-    rows: list[tuple[object, ...]] = []
     for position, task in enumerate(found):
         for scope, c in task.by_value.items():
-            given = position, task.name
+            given, same = (position, task.name), (slope(task), c.length_unit)
             for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
                 median, lower, upper, _ = inference.spread(values)
-                rows.append((*given, name, scope, median, lower, upper, c.done, slope(task)))
-            rows += [
-                (*given, POINT, scope, value, value, value, 1, slope(task))
-                for value in measures.residuals(c)
-            ]
-    names = ["position", "task", "quantity", "scope", "median", "lower", "upper", "runs", "slope"]
-    unit = next(iter(found[0].by_value.values())).length_unit
-    return pd.DataFrame(rows, columns=names).assign(length_unit=unit)
+                yield *given, name, scope, median, lower, upper, c.done, *same
+            for value in measures.residuals(c):
+                yield *given, POINT, scope, value, value, value, 1, *same
 
 
 def slope(task: Task) -> float:
@@ -210,9 +201,9 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def history_table(results: Results) -> pd.DataFrame:
+@table_of()
+def history_table(results: Results) -> Parts:
     """Return cost and distance of the best so far, per phase and cycle of the phase."""
-    parts = []
     for position, c in enumerate(results.main):
         names = measures.phase_names(c)
         for phase, own in groups(c.generations, "term_phase"):
@@ -228,8 +219,7 @@ def history_table(results: Results) -> pd.DataFrame:
                 columns |= dict(zip(("median", "lower", "upper"), quartiles, strict=True))
                 columns |= {"begun": wide.shape[1], "running": wide.notna().sum(axis=1).to_numpy()}
                 columns |= {"tolerance": measures.tolerances(c)[int(phase) - 1]}
-                parts.append(pd.DataFrame(columns).assign(length_unit=c.length_unit))
-    return pd.concat(parts, ignore_index=True)
+                yield columns | {"length_unit": c.length_unit}
 
 
 def draw_history(table: pd.DataFrame) -> Figure:

@@ -1,6 +1,6 @@
 """Robots and their covers, paths of postures, search scope, a local minimum (Corsépius 2001)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Conditions, ShownPath
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style
+from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style, table_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import median_replicate, solved
 from evoexp.report.results.stored_results import ConditionResults
@@ -146,7 +146,8 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     axes.plot(*(goal[name] for name in names), "*", zorder=8, **star)
 
 
-def scope_table(condition: ConditionResults) -> pd.DataFrame:
+@table_of("element order x y half_x half_y factor joint_x joint_y length_unit", is_rounded=True)
+def scope_table(condition: ConditionResults) -> Iterator[tuple[object, ...]]:
     """Return the shown path in its two liveliest joints, and hulls of the tool's first steps."""
     replicate = measures.shown_replicate(condition)
     problem, q = condition.problem(Problem), measures.paths(condition)[replicate]
@@ -161,14 +162,9 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
         places = tool_places(problem, np.clip(reached, *problem.limits.T))[:, :2]
         parts.append((REACH, places[ConvexHull(places).vertices], np.nan, np.nan, factor))
     parts.append((WAY, tool_places(problem, q)[:, :2], np.nan, np.nan, np.nan))
-    rows = [
-        (element, n, x, y, *rest)
-        for element, points, *rest in parts
-        for n, (x, y) in enumerate(points)
-    ]
-    names = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
-    table = rounded(pd.DataFrame(rows, columns=names))
-    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.length_unit)
+    for element, points, *rest in parts:
+        for n, (x, y) in enumerate(points):
+            yield element, n, x, y, *rest, a + 1, b + 1, condition.length_unit
 
 
 def draw_scope(table: pd.DataFrame) -> Figure:
@@ -327,9 +323,12 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
+@table_of(
+    f"position robot element name {' '.join(trails.COLUMNS)} inflation length_unit",
+    is_rounded=True,
+)
+def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> Iterator[tuple[object, ...]]:
     """Return bodies and covers of robots at their start, of (title, a condition of the robot)."""
-    rows: list[tuple[Any, ...]] = []
     for position, (title, c) in enumerate(shown):
         problem = c.problem(Problem)
         bodies, model, geometry = problem.bodies, problem.assembly.model, problem.assembly.geometry
@@ -347,9 +346,7 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
                 sizes = radius, 0.5 * length, 0.0
                 kind = "capsule" if length else "sphere"
                 own.append((COVER, name, kind, *middle, *turn, *sizes))
-        rows += [(position, title, *row, bodies.inflation, c.length_unit) for row in own]
-    names = ["position", "robot", "element", "name", *trails.COLUMNS, "inflation", "length_unit"]
-    return rounded(pd.DataFrame(rows, columns=names))
+        yield from ((position, title, *row, bodies.inflation, c.length_unit) for row in own)
 
 
 def draw_models(table: pd.DataFrame) -> Figure:

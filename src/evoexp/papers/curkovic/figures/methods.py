@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from evoexp.evolution.succession import pareto_front
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report.figures import groups, marks, rounded, style
+from evoexp.report.figures import Parts, groups, marks, style, table_of
 from evoexp.report.figures.side_by_side import draw_box
 from evoexp.report.pages.page_parts import Quantity
 from evoexp.report.results.run_measures import counted, grouped
@@ -45,15 +45,13 @@ DOMINATED, FRONT = style.ARM_COLOURS[:2]  # blue and red, as the paper draws the
 Fronts = dict[int, list[FrontRow]]  # replicate → front of each population
 
 
-def costs_table(results: Results, threshold: float) -> pd.DataFrame:
+@table_of()
+def costs_table(results: Results, threshold: float) -> Parts:
     """Return every run's best cost."""
-    parts = []
     for position, c in enumerate(results.with_data):
         columns: dict[str, Any] = {"position": position, "condition": c.label}
-        columns |= {"replicate": c.summaries.index}
-        columns |= {"cost": c.column("best_cost"), "refuted": measures.refuted(c) == 1.0}
-        parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
+        columns |= {"replicate": c.summaries.index, "cost": c.column("best_cost")}
+        yield columns | {"refuted": measures.refuted(c) == 1.0, "threshold": threshold}
 
 
 def draw_costs(table: pd.DataFrame) -> Figure:
@@ -203,9 +201,10 @@ def _rate(condition: ConditionResults) -> str:
     return "Eq. 10" if ga.mutation_decay else f"constant rate {ga.mutation_rate:g}"
 
 
-def facet_table(results: Results, threshold: float) -> pd.DataFrame:
+@table_of()
+def facet_table(results: Results, threshold: float) -> Parts:
     """Return medians of the best cost so far, and shares of runs that have reached a cost."""
-    parts, names = [], dict[str, int]()
+    names = dict[str, int]()
     for panel, (title, conditions) in enumerate(facets(results).items()):
         for name, c in conditions.items():
             first = measures.generations_to(c, threshold)
@@ -220,8 +219,7 @@ def facet_table(results: Results, threshold: float) -> pd.DataFrame:
             columns |= {"generation": index, "evaluations": spent, "median": best}
             columns |= {"reached": (first <= index[:, None]).mean(axis=1)}
             columns |= {"reaching": int(np.isfinite(first).sum()), "runs": c.done}
-            parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
+            yield columns | {"threshold": threshold}
 
 
 def draw_facets(table: pd.DataFrame, column: str) -> Figure:
@@ -250,17 +248,15 @@ def draw_facets(table: pd.DataFrame, column: str) -> Figure:
     return figure
 
 
-def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> Parts:
     """Return the criteria of every individual of every population."""
-    parts = []
     for front in fronts:
         columns: dict[str, Any] = {"generation": front.generation, "population": front.population}
         columns |= {"individual": np.arange(len(front.criteria))}
         columns |= dict(zip(CRITERIA, front.criteria.T, strict=True))
         columns |= {"non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T))}
-        parts.append(pd.DataFrame(columns))
-    table = rounded(pd.concat(parts, ignore_index=True))
-    return table.assign(replicate=replicate, length_unit=length_unit)
+        yield columns | {"replicate": replicate, "length_unit": length_unit}
 
 
 def draw_fronts(table: pd.DataFrame) -> Figure:

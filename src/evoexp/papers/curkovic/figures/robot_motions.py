@@ -22,7 +22,7 @@ from evoexp.papers import trails
 from evoexp.papers.curkovic import measures
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.figures import Parts, Rows, groups, marks, records, rounded, style, table_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -113,25 +113,23 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def tools_table(conditions: Sequence[ConditionResults]) -> Parts:
     """Return the end-effector paths of conditions that differ in the end-effector's radius."""
-    parts = []
     for position, c in enumerate(conditions):
         shown = measures.exemplar(c)
         path = _path(c.prepared, measures.sampled(c.prepared, c.solutions[shown], POINTS))
         model = c.planner.collision
-        given = path.assign(
-            condition=c.label,
-            position=position,
-            tcp_radius=model.tcp_radius,
-            collision_substeps=model.collision_substeps,
-            at_configuration=path["instant"] == path["instant"].round(),
-            refuted=shown in motion_geometry.refuted(c),
-        )
-        parts.append(given)
-    table = rounded(pd.concat(parts, ignore_index=True))
-    table = table.assign(length_unit=conditions[0].length_unit)
-    return table.drop(columns=["element", "link", "radius"])
+        yield {
+            **path.drop(columns=["element", "link", "radius"]),
+            "condition": c.label,
+            "position": position,
+            "tcp_radius": model.tcp_radius,
+            "collision_substeps": model.collision_substeps,
+            "at_configuration": path["instant"] == path["instant"].round(),
+            "refuted": shown in motion_geometry.refuted(c),
+            "length_unit": c.length_unit,
+        }
 
 
 def draw_tools(table: pd.DataFrame) -> Figure:
@@ -163,15 +161,13 @@ def draw_tools(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _links(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:
+@table_of(" ".join([*LINK, "replicate"]))
+def _links(prepared: Prepared, sampled: measures.SampledMotion) -> Rows:
     assembly = prepared.problem.assembly
     places = motion_geometry.joint_positions(assembly, sampled.q)
-    rows = [
-        (robot, link, instant, *start[k, :2], *end[k, :2], item.radius)
-        for item, (robot, link, start, end) in zip(assembly.links, places, strict=True)
-        for k, instant in enumerate(sampled.instants)
-    ]
-    return pd.DataFrame(rows, columns=LINK).assign(replicate=-1)
+    for item, (robot, link, start, end) in zip(assembly.links, places, strict=True):
+        for k, instant in enumerate(sampled.instants):
+            yield robot, link, instant, *start[k, :2], *end[k, :2], item.radius, -1
 
 
 def _path(prepared: Prepared, sampled: measures.SampledMotion) -> pd.DataFrame:
@@ -197,18 +193,16 @@ def _end_keys() -> list[Line2D]:
     ]
 
 
-def joints_table(condition: ConditionResults) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def joints_table(condition: ConditionResults) -> Parts:
     """Return link angles and their speeds along the best replicate's motion."""
     prepared, best = condition.prepared, condition.solutions[measures.exemplar(condition)]
     found, limits = measures.sampled(prepared, best, SAMPLES), measures.speed_limits(prepared)
-    parts = []
     for (robot, link), limit in np.ndenumerate(limits):
         columns: dict[str, Any] = {"robot": robot, "link": link, "instant": found.instants}
         columns |= {"at_configuration": found.instants == found.instants.round()}
         columns |= {"angle_deg": found.links[:, robot, link]}
-        columns |= {"turn_deg": np.abs(found.speeds[:, robot, link]), "limit_deg": limit}
-        parts.append(pd.DataFrame(columns))
-    return rounded(pd.concat(parts, ignore_index=True))
+        yield columns | {"turn_deg": np.abs(found.speeds[:, robot, link]), "limit_deg": limit}
 
 
 def draw_joints(table: pd.DataFrame) -> Figure:
@@ -250,9 +244,9 @@ def draw_joints(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> Parts:
     """Return the bodies' least distance: range over all motions, best replicate, straight line."""
-    parts = []
     for position, c in enumerate(conditions):
         scene = c.problem(Problem).scene
         distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
@@ -265,9 +259,7 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
             columns: dict[str, Any] = {"condition": c.label, "position": position, "series": name}
             columns |= {"instant": np.arange(q.shape[1]) / samples, "distance": distance(q)}
             columns |= {"replicates": c.done, "refuted": len(motion_geometry.refuted(c))}
-            parts.append(pd.DataFrame(columns))
-    table = rounded(pd.concat(parts, ignore_index=True))
-    return table.assign(length_unit=conditions[0].length_unit)
+            yield columns | {"length_unit": c.length_unit}
 
 
 def _sampled(condition: ConditionResults, replicate: int | None, samples: int) -> FloatArray:
@@ -309,7 +301,8 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def intersection_table(condition: ConditionResults) -> pd.DataFrame:
+@table_of("element x y x_end y_end angle_deg mu nu share crossing length_unit", is_rounded=True)
+def intersection_table(condition: ConditionResults) -> Rows:
     """Return links and intersection of two robots that go straight, where their top links cross."""
     problem = condition.problem(Problem)
     one, two = measures.arms(condition.prepared)
@@ -319,25 +312,17 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
     mu, nu = found.mu[TOP_LINKS], found.nu[TOP_LINKS]
     off = np.nan_to_num(np.maximum(np.abs(mu - 0.5), np.abs(nu - 0.5)), nan=np.inf)
     k = int(np.argmin(off))
-    rows: list[tuple[Any, ...]] = []
+    numbers = round(float(mu[k]), 9), round(float(nu[k]), 9), float(steps[k, 0, 0])
+    same = *numbers, bool(found.crossing[TOP_LINKS, k]), condition.length_unit
     for robot, arm in enumerate((one, two)):
         elbow_x, elbow_y, tip_x, tip_y = arm.outlines(links[k, robot].reshape(1, 2, 1))[0, :4, 0]
         angles = links[k, robot] / DEGREE
-        rows += [
-            (VECTORS[2 * robot], *arm.base, elbow_x, elbow_y, angles[0]),
-            (VECTORS[2 * robot + 1], elbow_x, elbow_y, tip_x, tip_y, angles[1]),
-        ]
-    _, x, y, x_end, y_end, _ = rows[1]
-    at = (x + mu[k] * (x_end - x), y + mu[k] * (y_end - y))
-    rows += [("base", *one.base, *two.base, np.nan), ("point", *at, *at, np.nan)]
-    names = ["element", "x", "y", "x_end", "y_end", "angle_deg"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(
-        mu=round(float(mu[k]), 9),
-        nu=round(float(nu[k]), 9),
-        share=float(steps[k, 0, 0]),
-        crossing=bool(found.crossing[TOP_LINKS, k]),
-        length_unit=condition.length_unit,
-    )
+        yield VECTORS[2 * robot], *arm.base, elbow_x, elbow_y, angles[0], *same
+        yield VECTORS[2 * robot + 1], elbow_x, elbow_y, tip_x, tip_y, angles[1], *same
+        if robot == 0:
+            at = elbow_x + mu[k] * (tip_x - elbow_x), elbow_y + mu[k] * (tip_y - elbow_y)
+    yield "base", *one.base, *two.base, np.nan, *same
+    yield "point", *at, *at, np.nan, *same
 
 
 def draw_intersection(table: pd.DataFrame) -> Figure:

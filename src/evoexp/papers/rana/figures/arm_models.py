@@ -1,6 +1,7 @@
 """Drawings of the models of arms: angles, via-points, links as touching circles or spheres."""
 
 import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from evoexp.papers import trails
 from evoexp.papers.rana import measures
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style
+from evoexp.report.figures import groups, marks, motion_scenes, records, rounded, style, table_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -27,18 +28,17 @@ POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
 NUMBERED = 5  # every fifth via-point carries its number
 
 
-def arms_table(condition: ConditionResults) -> pd.DataFrame:
+@table_of("posture arm joint x y x_end y_end reference_deg angle_deg length_unit", is_rounded=True)
+def arms_table(condition: ConditionResults) -> Iterator[tuple[object, ...]]:
     """Return links and joint angles at start and goal."""
-    problem = condition.problem(Problem)
-    rows = []
+    problem, unit = condition.problem(Problem), condition.length_unit
     for posture, q in (("start", problem.start), ("goal", problem.goal)):
         for arm, joint, start, end in motion_geometry.joint_positions(problem.assembly, q[:, None]):
             angle = q[problem.arm_slices[arm, 0] + joint]
             x, y = (end - start)[0, :2]
             direction = np.degrees(np.arctan2(y, x))
-            rows.append((posture, arm, joint, *start[0, :2], *end[0, :2], direction - angle, angle))
-    names = ["posture", "arm", "joint", "x", "y", "x_end", "y_end", "reference_deg", "angle_deg"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.length_unit)
+            ends = *start[0, :2], *end[0, :2]
+            yield posture, arm, joint, *ends, direction - angle, angle, unit
 
 
 def draw_arms(table: pd.DataFrame) -> Figure:
@@ -118,19 +118,22 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def circles_table(condition: ConditionResults) -> pd.DataFrame:
+@table_of(
+    "element arm x y x_end y_end radius distance safety_distance instant length_unit",
+    is_rounded=True,
+)
+def circles_table(condition: ConditionResults) -> Iterator[tuple[object, ...]]:
     """Return links and circles of the best replicate at its via-point of least centre distance."""
     problem = condition.problem(Problem)
     q = measures.best_motion(condition)
     instant = int(np.argmin(problem.centre_distances(q)))
-    at = q[:, instant]
-    rows: list[tuple[object, ...]] = [
-        ("link", arm, *start[0, :2], *end[0, :2], np.nan, np.nan)
-        for arm, _, start, end in motion_geometry.joint_positions(problem.assembly, at[:, None])
-    ]
+    at, same = q[:, instant], (problem.security_margin, instant, condition.length_unit)
+    for arm, _, start, end in motion_geometry.joint_positions(problem.assembly, at[:, None]):
+        yield "link", arm, *start[0, :2], *end[0, :2], np.nan, np.nan, *same
     centres = problem.sphere_centres(at)
     for arm, points in enumerate(centres):
-        rows += [("circle", arm, *p[:2], *p[:2], problem.sphere_radius, np.nan) for p in points]
+        for p in points:
+            yield "circle", arm, *p[:2], *p[:2], problem.sphere_radius, np.nan, *same
     # the two closest centres of different arms
     couples = (
         couple
@@ -138,13 +141,9 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
         for couple in itertools.product(first, second)
     )
     a, b = min(couples, key=lambda ab: float(np.linalg.norm(ab[0] - ab[1])))
-    rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
+    yield "centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b)), *same
     least, (a, b) = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
-    rows.append(("bodies", -1, *a[:2], *b[:2], np.nan, least))
-    names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
-    table = rounded(pd.DataFrame(rows, columns=names))
-    table = table.assign(safety_distance=problem.security_margin, instant=instant)
-    return table.assign(length_unit=condition.length_unit)
+    yield "bodies", -1, *a[:2], *b[:2], np.nan, least, *same
 
 
 def draw_circles(table: pd.DataFrame) -> Figure:
@@ -175,15 +174,14 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
+@table_of()
+def path_table(condition: ConditionResults, solution: FloatArray) -> Iterator[dict[str, Any]]:
     """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
-    frames = []
     shape = condition.planner.shape(condition.problem(Problem))
     parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shape])[:-1])
     for arm, (values, (rows, joints)) in enumerate(zip(parts, shape, strict=True)):
-        angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")
-        frames.append(pd.DataFrame({"arm": arm, "instant": range(rows)}).join(angles))
-    return pd.concat(frames, ignore_index=True)
+        angles = zip(ANGLES, values.reshape(rows, joints).T, strict=True)
+        yield {"arm": arm, "instant": range(rows), **dict(angles)}
 
 
 def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:

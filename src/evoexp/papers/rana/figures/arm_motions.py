@@ -17,7 +17,7 @@ from evoexp.papers.rana.figures.arm_models import links_table, path_table
 from evoexp.papers.rana.measures import STRAIGHT, TO_OBSTACLES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, marks, rounded, style
+from evoexp.report.figures import Parts, groups, marks, rounded, style, table_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -96,37 +96,33 @@ def spatial_paths_table(condition: ConditionResults) -> pd.DataFrame:
     return table.assign(length_unit=condition.length_unit)
 
 
-def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
+@table_of()
+def _path(condition: ConditionResults, solution: FloatArray) -> Parts:
     problem = condition.problem(Problem)
     q = motion_geometry.configurations(condition.prepared, solution)
     places = motion_geometry.joint_positions(problem.assembly, q)
     tips = {arm: end for arm, _, _, end in places}  # the last link's end stays
-    frames = []
     for arm, (first, stop) in enumerate(problem.arm_slices):
         columns: dict[str, Any] = {"arm": arm, "instant": np.arange(q.shape[1])}
         columns |= dict(zip("xyz", tips[arm].T, strict=True))
-        columns |= {f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)}
-        frames.append(pd.DataFrame(columns))
-    return pd.concat(frames, ignore_index=True)
+        yield columns | {f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)}
 
 
+@table_of()
 def tables_of_paths(
     condition: ConditionResults,
-    table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
+    table: Callable[[ConditionResults, FloatArray], pd.DataFrame],
     best: str,
-) -> pd.DataFrame:
+) -> Parts:
     """Return one table of the replicates' solutions and of the straight line."""
     solutions, best_replicate = condition.solutions, condition.best_replicate
     shown = [k for n, k in enumerate(solutions) if n < MOST_PATHS or k == best_replicate]
     others = OTHERS if len(shown) == len(solutions) else f"{OTHERS} of {len(solutions)}"
-    parts = [
-        table_of(condition, solutions[k]).assign(
-            series=best if k == best_replicate else others, replicate=k
-        )
-        for k in shown
-    ]
-    straight = table_of(condition, measures.straight_line(condition))
-    return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
+    for k in shown:
+        series = best if k == best_replicate else others
+        yield {**table(condition, solutions[k]), "series": series, "replicate": k}
+    straight = table(condition, measures.straight_line(condition))
+    yield {**straight, "series": STRAIGHT, "replicate": -1}
 
 
 def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = False) -> Figure:
@@ -179,9 +175,10 @@ def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = Fals
     return figure
 
 
-def distances_table(condition: ConditionResults, samples: int) -> pd.DataFrame:
+@table_of(is_rounded=True)
+def distances_table(condition: ConditionResults, samples: int) -> Parts:
     """Return least distances along the best motion and the straight line, their range over all."""
-    solutions, exact, parts = condition.solutions, measures.approaches(condition), []
+    solutions, exact = condition.solutions, measures.approaches(condition)
     sampled = partial(measures.sampled, condition, samples=samples)
     for kind, (pairs, margin) in measures.kinds_of_pairs(condition).items():
         own = exact[exact["kind"] == kind]
@@ -208,10 +205,8 @@ def distances_table(condition: ConditionResults, samples: int) -> pd.DataFrame:
                     series[name] = rows[at_name].to_numpy(), rows["clearance"].to_numpy()
             for name, (instants, distances) in series.items():
                 columns: dict[str, Any] = {"measure": measure, "series": name}
-                columns |= {"instant": instants, "distance": distances}
-                parts.append(pd.DataFrame(columns).assign(kind=kind, safety_distance=margin))
-    table = rounded(pd.concat(parts, ignore_index=True))
-    return table.assign(length_unit=condition.length_unit)
+                columns |= {"instant": instants, "distance": distances, "kind": kind}
+                yield columns | {"safety_distance": margin, "length_unit": condition.length_unit}
 
 
 def _measures(

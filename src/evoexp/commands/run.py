@@ -101,21 +101,13 @@ class Runs:
 
         Not `told`, it leaves no line behind.
         """
-        again = option_words(self._arguments)
-        asked = [
-            (each, [word for word in overrides if not word.startswith(ADDRESS)])
-            for each, overrides in asked
-        ]
-        wanted = [
-            (
-                each,
-                each.num_replicates(experiment.num_replicates),
-                experiment.origin(label, command),
-            )
-            for experiment, overrides in asked
-            for command in (shlex.join(["evoexp", "run", *overrides, *again]),)
-            for label, each in _that_can_run(experiment)
-        ]
+        again, wanted = option_words(self._arguments), []
+        for experiment, overrides in asked:
+            words = [word for word in overrides if not word.startswith(ADDRESS)]
+            command = shlex.join(["evoexp", "run", *words, *again])
+            for label, each in _that_can_run(experiment):
+                count = each.num_replicates(experiment.num_replicates)
+                wanted.append((each, count, experiment.origin(label, command)))
         settings, retry = (self._runner, outputs_root()), self._arguments.retry_failed
         batch = Batch(wanted, *settings, retry_failed=retry, curves=self._curves)
         batch.prepare()

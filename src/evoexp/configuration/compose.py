@@ -6,6 +6,7 @@ the chosen options; settings are assigned to copies of these (see `overrides`).
 """
 
 import contextlib
+import importlib.util
 import itertools
 import math
 import os
@@ -32,23 +33,18 @@ from evoexp.configuration import search_path
 from evoexp.configuration.building import build_settings, fill_in, planned_replicates
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment
-from evoexp.configuration.overrides import (
-    ADD,
-    DELETE,
-    NOT_IDENTITY,
-    SCALARS,
-    SWEEP,
-    Choice,
-    Override,
-    Span,
-)
+from evoexp.configuration.overrides import NOT_IDENTITY, SCALARS, SWEEP, Choice, Override, Span
 from evoexp.configuration.search_path import EXPERIMENT, chosen, find, groups, is_file, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.input_files import MEGABYTE, read_bounded
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
-_PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: syntax.FORCE, OverrideType.DEL: DELETE}
+_PREFIXES = {
+    OverrideType.ADD: syntax.ADD,
+    OverrideType.FORCE_ADD: syntax.FORCE,
+    OverrideType.DEL: syntax.DELETE,
+}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 # parts of an entry of `conditions`, with what each is where it is left out
 PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
@@ -169,7 +165,7 @@ class Composer:
         words = []
         for group, override in choices.items():
             option = names[group]
-            if option is None and override.prefix == DELETE and override.values:
+            if option is None and override.prefix == syntax.DELETE and override.values:
                 option = str(override.values[0].data)  # only that option is to be deleted
             chosen = "" if option is None else f"={_quoted(option)}"
             words.append(f"{'~' if names[group] is None else ''}{group}{chosen}")
@@ -228,6 +224,9 @@ def _expand_one(
     ).of(built)
     if not space:
         return experiment
+    if importlib.util.find_spec("optuna") is None:
+        must = "left out: optuna needs pip install 'evoexp[tuning]'"
+        raise SettingError(SWEEP, must, "optuna")
     from evoexp.configuration.setting_search import SearchSettings, with_search  # pandas
 
     settings = build_settings(SearchSettings, base[SWEEP], SWEEP)

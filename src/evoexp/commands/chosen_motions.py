@@ -129,7 +129,6 @@ def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], end
 
 def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
     """Write a file whole or not at all, and say where it is and how large."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, content)
     if is_said:
         size = len(content) / 1000

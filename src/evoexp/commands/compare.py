@@ -34,12 +34,8 @@ def main(arguments: argparse.Namespace) -> int:
         (latex,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
         write_file(Path(arguments.latex), latex)
     if arguments.ioh:
-        written = {
-            folder / name: content for name, content in comparison_files.ioh_files(runs).items()
-        }
-        for path in written:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        write_files(written)
+        tables = comparison_files.ioh_files(runs).items()
+        write_files({folder / name: content for name, content in tables})
     if arguments.json:
         inner = ("interval", "lengths")
         print_json([row._asdict() | {k: getattr(row, k)._asdict() for k in inner} for row in rows])

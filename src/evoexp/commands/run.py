@@ -48,9 +48,8 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         print(USAGE.format(number=len(options("experiment"))), file=sys.stderr)
         return 2
-    experiments = compose.expand(
-        arguments.overrides, multirun=arguments.multirun, only=arguments.only
-    )
+    asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
+    experiments = compose.expand(arguments.overrides, **asked)
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
     runner = experiments[0].runner
@@ -69,9 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
         for experiment in searched:
             run_trials(experiment, runs, arguments.overrides)
     if searched:  # the conditions are those of all trials now
-        experiments = compose.expand(
-            arguments.overrides, multirun=arguments.multirun, only=arguments.only
-        )
+        experiments = compose.expand(arguments.overrides, **asked)
     if runs.num_left:
         left = runs.num_left
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"

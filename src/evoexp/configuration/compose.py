@@ -106,8 +106,10 @@ def parse(text: str) -> Override:
         raise unparsed(text) from None
     is_bare = found.value_type is None  # a deletion
     values = () if is_bare else tuple(map(syntax.Value, texts, map(_with_text_keys, data)))
-    if found.is_range_sweep():
-        span = _of_range(values, found.value())
+    if found.is_range_sweep() and len(values) > 1:
+        numbers = [value.data for value in values]  # in any order
+        sweep: Any = found.value()
+        span = Span(min(numbers), max(numbers), abs(sweep.step), is_interval=False)
     prefix = _PREFIXES.get(found.type, "")
     return Override(prefix, key, values, found.is_sweep_override(), text, span)
 
@@ -118,14 +120,6 @@ def _span(key: str, interval: Any, typed: str) -> Span:
         must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
         raise SettingError(key, must, typed)
     return Span(low, high, 1 if isinstance(low, int) else None, is_log)
-
-
-def _of_range(values: Sequence[syntax.Value], sweep: Any) -> Span | None:
-    """Return the span of the numbers of a range, whatever their order."""
-    numbers = [value.data for value in values]
-    if len(numbers) < 2:
-        return None
-    return Span(min(numbers), max(numbers), abs(sweep.step), is_interval=False)
 
 
 def _with_text_keys(value: Any) -> Any:

@@ -96,7 +96,7 @@ def test_a_container_has_less_memory_than_its_machine(
 
 
 def test_more_generations_than_a_log_holds_are_refused() -> None:
-    must = "planner: must be of fewer than 512,000 generations: a log holds 128 MB"
+    must = "planner: must be one of fewer than 512,000 generations: a log holds 128 MB"
     with pytest.raises(SettingError, match=must):
         runner_settings.refuse_large(changed("num_generations", 10**9), 1e15)
 

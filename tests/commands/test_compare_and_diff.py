@@ -80,19 +80,6 @@ def test_the_table_is_written_as_csv_and_latex(
     assert all(f"\n{name} & 2 & " in latex.read_text() for name in names[1:])
 
 
-def test_runs_are_written_for_iohprofiler_into_an_empty_folder(
-    evoexp: Evoexp, stored: Path, tmp_path: Path
-) -> None:
-    folder = tmp_path / "ioh" / "data"
-    words = ("compare", "rana_planar", *SERIAL, "--ioh", str(folder))
-    assert evoexp(*words).code == 0
-    names = sorted(path.name for path in folder.iterdir())
-    assert names == ["multi-start", "random_search", "via-point_GA"]
-    assert all((folder / name / "IOHprofiler_f1_rana_planar.json").is_file() for name in names)
-    said = evoexp(*words)
-    assert said.code == 2 and "--ioh: must be a folder that is empty or not there yet" in said.err
-
-
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers(-3, 3) | st.text("ab", max_size=2),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text("xyz", max_size=1), inner),

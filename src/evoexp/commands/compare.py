@@ -10,21 +10,16 @@ from evoexp.commands.report import chosen, folder_name
 from evoexp.commands.stored_runs import unpacked
 from evoexp.condition import Condition
 from evoexp.configuration.conditions import SAME
-from evoexp.errors import SettingError
 from evoexp.report.pages import build, comparison, markdown
 from evoexp.report.results import comparison_files
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
-from evoexp.store.files import write_file, write_files
+from evoexp.store.files import write_file
 from evoexp.store.run_directory import outputs_root
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Draw the page, and print its table."""
     arguments.overrides = unpacked(arguments.overrides)
-    folder = Path(arguments.ioh or "")
-    # readers would take older files in it for runs, too
-    if arguments.ioh and folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
-        raise SettingError("--ioh", "a folder that is empty or not there yet", arguments.ioh)
     files, request, runs, strange = drawn(arguments)
     page = build.write_report(files)
     rows = comparison.rated(runs, request.settings)
@@ -33,9 +28,6 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.latex:
         (latex,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
         write_file(Path(arguments.latex), latex)
-    if arguments.ioh:
-        tables = comparison_files.ioh_files(runs).items()
-        write_files({folder / name: content for name, content in tables})
     if arguments.json:
         inner = ("interval", "lengths")
         print_json([row._asdict() | {k: getattr(row, k)._asdict() for k in inner} for row in rows])
@@ -49,7 +41,7 @@ def main(arguments: argparse.Namespace) -> int:
     say(table)
     for line in strange:
         say(line)
-    for kind in ("csv", "latex", "ioh"):
+    for kind in ("csv", "latex"):
         if place := getattr(arguments, kind):
             say(f"{kind}: {place}")
     say(f"compare: {page}")

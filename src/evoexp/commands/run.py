@@ -28,6 +28,7 @@ from evoexp.configuration.experiment import Built, Experiment, Labelled
 from evoexp.configuration.overrides import SWEEP
 from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
+from evoexp.numeric.cache_folder import cache_root
 from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.report_settings import page_registration
 from evoexp.store.identity import environment
@@ -119,7 +120,9 @@ class Runs:
         if told:
             counts = " or ".join(map(str, planned))
             say(f"replicates of each condition, fixed before they run: {counts}")
-            say("kernels that this machine has not run before are compiled first, for minutes")
+            kernels = cache_root() / "kernels"
+            if not (kernels.is_dir() and any(kernels.iterdir())):
+                say("kernels are compiled first: some minutes, once on this machine")
         counted = Counter(job.condition_id for job in batch.jobs)
         missing = {
             c.id: (notes["label"], counted[c.id]) for c, _, notes in wanted if c.id in counted

@@ -21,20 +21,16 @@ from matrix import counts
 from worker_tasks import LEAST, MEGABYTE, MOST, Struck, content, end, end_once, refuse, work
 
 
-def test_results_come_in_order_and_each_task_is_done_once() -> None:
+def test_results_come_in_order_from_workers_of_one_thread_per_library() -> None:
+    names = ("OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+    before = [os.environ.get(name) for name in names]
     with Workers(2) as workers:
         assert list(in_order(workers, abs, ((-k,) for k in range(20)))) == list(range(20))
         assert list(in_order(workers, abs, [])) == []
         pids = set(in_order(workers, os.getpid, [()] * 20))
+        assert list(in_order(workers, os.getenv, ((name,) for name in names))) == ["1", "1"]
     assert 1 <= len(pids) <= 2
     assert are_gone(*pids)
-
-
-def test_workers_have_one_thread_per_library_whoever_started_them() -> None:
-    names = ("OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
-    before = [os.environ.get(name) for name in names]
-    with Workers(2) as workers:
-        assert list(in_order(workers, os.getenv, ((name,) for name in names))) == ["1", "1"]
     assert [os.environ.get(name) for name in names] == before
 
 

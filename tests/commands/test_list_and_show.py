@@ -16,9 +16,9 @@ from evoexp.commands import show
 from evoexp.commands.list_ import EXPERIMENT_KEYS, RUN_KEYS
 from evoexp.commands.show import INDENT, KEYS, MAX_LINES, screen
 from evoexp.configuration import compose
-from evoexp.configuration.search_path import description, options
+from evoexp.configuration.search_path import find, options
 from evoexp.evolution.operators.operator import GeneticSettings
-from evoexp.shipped import Shipped
+from evoexp.shipped import Shipped, described
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import read_summaries
@@ -253,7 +253,7 @@ def test_without_runs(evoexp: Evoexp, outputs: Path) -> None:
     assert f"no runs stored in {outputs}" in said.out
     for name in options("experiment"):
         assert f"│ {name} " in said.out
-        assert description(name).split(" ")[0] in said.out
+        assert described(Path(find("experiment", name).path)).split(" ")[0] in said.out
     assert not outputs.exists()
 
 

@@ -8,8 +8,9 @@ import pytest
 import yaml
 
 from evoexp.configuration.compose import expand
-from evoexp.configuration.search_path import description, find, folders, options, searched_first
+from evoexp.configuration.search_path import find, folders, options, searched_first
 from evoexp.errors import EvoexpError, RegistrationError, SettingError
+from evoexp.shipped import described
 from guests import on_path, write_distribution
 
 HEAD = "# @package _global_\n# evoexp run experiment=mine\n# Mine.\n"
@@ -146,7 +147,7 @@ def test_an_experiment_may_be_a_file_anywhere(
     assert (experiment.name, experiment.changed) == ("mine", False)
     assert experiment.conditions[0].label == "mine"
     assert experiment.options["mine"][0].source == path
-    assert description(path) == "Mine."
+    assert described(Path(find("experiment", path).path)) == "Mine."
     monkeypatch.chdir(Path(path).parent)
     assert expand(["experiment=mine.yaml"])[0].conditions == experiment.conditions
     assert expand(["experiment=./mine.yaml", "seed=1"])[0].changed

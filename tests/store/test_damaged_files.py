@@ -60,7 +60,7 @@ FAULTS: list[tuple[Fault, str]] = [
     (empty, "empty file"),
     (flip, "altered"),
     (directory, "cannot be read: Is a directory"),
-    (pipe, "cannot be read: no regular file"),
+    (pipe, "cannot be read: not a regular file"),
     (loop, "cannot be read"),
     (replaced_by(lambda path: path.symlink_to("nowhere")), "cannot be read: No such file"),
     (lambda path: path.write_bytes(write(generations(6), 9).content), "holds replicate 9"),

@@ -17,9 +17,9 @@ import numpy as np
 
 from evoexp.collision.box_support import EXACT, coal, corners_of
 from evoexp.errors import EvoexpError
+from evoexp.numeric.compilation import sources_key
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import matrix_product
-from evoexp.numeric.kernel_folders import sources_key
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 

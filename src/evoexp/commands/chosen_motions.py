@@ -1,6 +1,7 @@
 """`evoexp view`, `play`, `export`, `evaluate`: motions of replicates, of logs, or out of a file."""
 
 import argparse
+import functools
 import json
 import math
 import re
@@ -128,7 +129,6 @@ def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], end
 
 def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
     """Write a file whole or not at all, and say where it is and how large."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, content)
     if is_said:
         size = len(content) / 1000
@@ -159,7 +159,6 @@ def play(arguments: argparse.Namespace) -> int:
 
 def export(arguments: argparse.Namespace) -> int:
     """Write a motion as a joint trajectory, for a robot or MoveIt."""
-    from evoexp.commands.console import say
     from evoexp.playback import trajectory  # and scipy
 
     if not 0.0 < arguments.ramp < math.inf:
@@ -172,14 +171,9 @@ def export(arguments: argparse.Namespace) -> int:
         names, arguments.limits, speeds, found.velocity_limits, arguments.ramp
     )
     timed = trajectory.trajectory(found, arguments.timing, limits)
-    if arguments.format == "ros":
-        content = trajectory.as_ros(timed)
-    else:
-        content = (
-            trajectory.as_csv(timed)
-            if arguments.format == "csv"
-            else trajectory.as_json(found, timed)
-        )
+    write_json = functools.partial(trajectory.as_json, found)
+    writers: Any = {"ros": trajectory.as_ros, "csv": trajectory.as_csv, "json": write_json}
+    content = writers[arguments.format](timed)
     ending = ".csv" if arguments.format == "csv" else ".json"
     write(output_path(arguments, [found], ending), content)
     # how long the motion takes, how near it comes to the limits, and what is proven of it

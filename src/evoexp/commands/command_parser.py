@@ -18,24 +18,9 @@ MOTION_ENDINGS = (".json", ".npy", ".csv", ".yaml", ".yml")
 _DECLARED: dict[str, Any] = yaml.load(
     resources.files("evoexp").joinpath("assets/commands.yaml").read_bytes(), yaml.CSafeLoader
 )
-COMMANDS: dict[str, str] = {name: command["summary"] for name, command in _DECLARED.items()}
-# where a module has another name, or the functions of several commands
-MODULES = dict.fromkeys(("view", "play", "export", "evaluate"), "chosen_motions")
-MODULES |= dict.fromkeys(("verify", "clean"), "store_care")
-MODULES |= {"claims": "report", "list": "list_", "pack": "stored_runs"}
-HYDRAS_OPTIONS = {
-    "--cfg": "evoexp show experiment=NAME, with --all for every setting",
-    "--info": "evoexp show experiment=NAME, or evoexp list",
-    "--resolve": "evoexp show --all experiment=NAME",
-    "--package": "evoexp show --all experiment=NAME",
-    "--run": "evoexp run experiment=NAME",
-    "--config-name": "evoexp run experiment=NAME",
-    "--config-path": "--config-dir DIR",
-    "--experimental-rerun": "evoexp reproduce HASH",
-    "--shell-completion": "evoexp completion bash",
-    "--hydra-help": "evoexp run --help",
-}
+HYDRAS_OPTIONS: dict[str, str] = _DECLARED.pop("hydras_options")
 """Option of a Hydra application → evoexp's own way."""
+COMMANDS: dict[str, str] = {name: command["summary"] for name, command in _DECLARED.items()}
 
 
 def option_words(arguments: argparse.Namespace) -> list[str]:
@@ -98,7 +83,7 @@ class CommandParser(argparse.ArgumentParser):
 
 def command_module(name: str) -> ModuleType:
     """Import the module of a command."""
-    return importlib.import_module(f"evoexp.commands.{MODULES.get(name, name)}")
+    return importlib.import_module(f"evoexp.commands.{_DECLARED[name].get('module', name)}")
 
 
 def command_function(name: str) -> Callable[[argparse.Namespace], int]:

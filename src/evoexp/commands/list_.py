@@ -3,6 +3,7 @@
 import argparse
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from rich.table import Table
 
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
 from evoexp.commands.stored_runs import in_archive, looked_into, stored_runs
-from evoexp.configuration.search_path import description, find, options
+from evoexp.configuration.search_path import find, options
 from evoexp.errors import EvoexpError, SettingError, printable
+from evoexp.shipped import described
 from evoexp.store.files import listed
 from evoexp.store.identity import ORIGIN
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -52,7 +54,7 @@ def _print(arguments: argparse.Namespace, place: str, stored: Iterable[NamedRun]
         return 0
     names = options("experiment") if arguments.archive is None else ()
     files = [find("experiment", name) for name in names]
-    told = ((each.name, description(each.name), each.origin, each.path) for each in files)
+    told = ((each.name, described(Path(each.path)), each.origin, each.path) for each in files)
     experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in told]
     runs = [run_row(name, run) for name, run in stored]
     if arguments.json:

@@ -54,8 +54,6 @@ def main(arguments: argparse.Namespace) -> int:
             if "__pycache__" not in path and (template / path).is_file()
         }
     try:
-        for path in files:
-            path.parent.mkdir(parents=True, exist_ok=True)
         write_files({path: text.encode() for path, text in files.items()})
     except BaseException:
         shutil.rmtree(root, ignore_errors=True)  # so that the same command can be given again

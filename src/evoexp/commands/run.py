@@ -49,9 +49,8 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         print(USAGE.format(number=len(options("experiment"))), file=sys.stderr)
         return 2
-    experiments = compose.expand(
-        arguments.overrides, multirun=arguments.multirun, only=arguments.only
-    )
+    asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
+    experiments = compose.expand(arguments.overrides, **asked)
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
     runner = experiments[0].runner
@@ -70,9 +69,7 @@ def main(arguments: argparse.Namespace) -> int:
         for experiment in searched:
             run_trials(experiment, runs, arguments.overrides)
     if searched:  # the conditions are those of all trials now
-        experiments = compose.expand(
-            arguments.overrides, multirun=arguments.multirun, only=arguments.only
-        )
+        experiments = compose.expand(arguments.overrides, **asked)
     if runs.num_left:
         left = runs.num_left
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
@@ -102,21 +99,13 @@ class Runs:
 
         Not `told`, it leaves no line behind.
         """
-        again = option_words(self._arguments)
-        asked = [
-            (each, [word for word in overrides if not word.startswith(ADDRESS)])
-            for each, overrides in asked
-        ]
-        wanted = [
-            (
-                each,
-                each.num_replicates(experiment.num_replicates),
-                experiment.origin(label, command),
-            )
-            for experiment, overrides in asked
-            for command in (shlex.join(["evoexp", "run", *overrides, *again]),)
-            for label, each in _that_can_run(experiment)
-        ]
+        again, wanted = option_words(self._arguments), []
+        for experiment, overrides in asked:
+            words = [word for word in overrides if not word.startswith(ADDRESS)]
+            command = shlex.join(["evoexp", "run", *words, *again])
+            for label, each in _that_can_run(experiment):
+                count = each.num_replicates(experiment.num_replicates)
+                wanted.append((each, count, experiment.origin(label, command)))
         settings, retry = (self._runner, outputs_root()), self._arguments.retry_failed
         batch = Batch(wanted, *settings, retry_failed=retry, curves=self._curves)
         batch.prepare()

@@ -26,7 +26,6 @@ PAPER, FEWER = "paper", "paper, fewer runs"  # budgets
 def main(arguments: argparse.Namespace) -> int:
     """Write the page, and name it."""
     directory, files = home_files()
-    directory.mkdir(parents=True, exist_ok=True)
     write_file(directory / HTML, files[HTML])
     say(f"site: {directory / HTML}")
     # unfinished runs that another process is writing now

@@ -74,13 +74,8 @@ def verify(arguments: argparse.Namespace) -> int:
     return 1 if damaged else 0
 
 
-def _checked_runs(checks: Sequence[RunCheck]) -> list[RunCheck]:
-    logs_of = _all_logs(checks)
-    return [_checked(each, logs_of[each.hash]) for each in checks]
-
-
-def _all_logs(runs: Sequence[RunCheck]) -> dict[str, list[LogCheck]]:
-    """Return the checks of every run's logs by its hash; worker processes check large stores."""
+def _checked_runs(runs: Sequence[RunCheck]) -> list[RunCheck]:
+    """Check the logs of runs, too; worker processes check large stores."""
     stored = [(check.run, k) for check in runs if check.run for k in sorted(check.run.completed())]
     tasks = [(run.log_path(k), run.condition_id) for run, k in stored]
     if len(tasks) >= MANY or sum(path.lstat().st_size for path, _ in tasks) >= LARGE:
@@ -91,7 +86,7 @@ def _all_logs(runs: Sequence[RunCheck]) -> dict[str, list[LogCheck]]:
     logs = defaultdict[str, list[LogCheck]](list)
     for (run, _), check in zip(stored, checks, strict=True):
         logs[run.hash12].append(check)
-    return logs
+    return [_checked(each, logs[each.hash]) for each in runs]
 
 
 def _check(path: Path, condition_id: str) -> LogCheck:

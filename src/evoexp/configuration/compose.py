@@ -6,6 +6,7 @@ the chosen options; settings are assigned to copies of these (see `overrides`).
 """
 
 import contextlib
+import importlib.util
 import itertools
 import math
 import os
@@ -32,23 +33,18 @@ from evoexp.configuration import search_path
 from evoexp.configuration.building import build_settings, fill_in, planned_replicates
 from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Built, Experiment
-from evoexp.configuration.overrides import (
-    ADD,
-    DELETE,
-    NOT_IDENTITY,
-    SCALARS,
-    SWEEP,
-    Choice,
-    Override,
-    Span,
-)
+from evoexp.configuration.overrides import NOT_IDENTITY, SCALARS, SWEEP, Choice, Override, Span
 from evoexp.configuration.search_path import EXPERIMENT, chosen, find, groups, is_file, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.input_files import MEGABYTE, read_bounded
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
-_PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: syntax.FORCE, OverrideType.DEL: DELETE}
+_PREFIXES = {
+    OverrideType.ADD: syntax.ADD,
+    OverrideType.FORCE_ADD: syntax.FORCE,
+    OverrideType.DEL: syntax.DELETE,
+}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 # parts of an entry of `conditions`, with what each is where it is left out
 PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
@@ -110,8 +106,10 @@ def parse(text: str) -> Override:
         raise unparsed(text) from None
     is_bare = found.value_type is None  # a deletion
     values = () if is_bare else tuple(map(syntax.Value, texts, map(_with_text_keys, data)))
-    if found.is_range_sweep():
-        span = _of_range(values, found.value())
+    if found.is_range_sweep() and len(values) > 1:
+        numbers = [value.data for value in values]  # in any order
+        sweep: Any = found.value()
+        span = Span(min(numbers), max(numbers), abs(sweep.step), is_interval=False)
     prefix = _PREFIXES.get(found.type, "")
     return Override(prefix, key, values, found.is_sweep_override(), text, span)
 
@@ -122,14 +120,6 @@ def _span(key: str, interval: Any, typed: str) -> Span:
         must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
         raise SettingError(key, must, typed)
     return Span(low, high, 1 if isinstance(low, int) else None, is_log)
-
-
-def _of_range(values: Sequence[syntax.Value], sweep: Any) -> Span | None:
-    """Return the span of the numbers of a range, whatever their order."""
-    numbers = [value.data for value in values]
-    if len(numbers) < 2:
-        return None
-    return Span(min(numbers), max(numbers), abs(sweep.step), is_interval=False)
 
 
 def _with_text_keys(value: Any) -> Any:
@@ -169,7 +159,7 @@ class Composer:
         words = []
         for group, override in choices.items():
             option = names[group]
-            if option is None and override.prefix == DELETE and override.values:
+            if option is None and override.prefix == syntax.DELETE and override.values:
                 option = str(override.values[0].data)  # only that option is to be deleted
             chosen = "" if option is None else f"={_quoted(option)}"
             words.append(f"{'~' if names[group] is None else ''}{group}{chosen}")
@@ -228,6 +218,9 @@ def _expand_one(
     ).of(built)
     if not space:
         return experiment
+    if importlib.util.find_spec("optuna") is None:
+        must = "left out: optuna needs pip install 'evoexp[tuning]'"
+        raise SettingError(SWEEP, must, "optuna")
     from evoexp.configuration.setting_search import SearchSettings, with_search  # pandas
 
     settings = build_settings(SearchSettings, base[SWEEP], SWEEP)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 from evoexp import shipped
 from evoexp.errors import RegistrationError, SettingError, UnknownOption
 from evoexp.registry import CONF, Registration, registrations
-from evoexp.shipped import Option, described
+from evoexp.shipped import Option
 
 VARIABLE, ARGUMENT = "EVOEXP_CONFIG_DIR", "--config-dir"
 EXPERIMENT = "experiment"
@@ -120,8 +120,3 @@ def find(group: str, name: str) -> Option:
 def is_file(experiment: str) -> bool:
     """Return whether an experiment is given as the path of a file."""
     return experiment.endswith(SUFFIXES)
-
-
-def description(experiment: str) -> str:
-    """Return the line of an experiment file that says what the experiment is."""
-    return described(Path(find(EXPERIMENT, experiment).path))

@@ -16,7 +16,10 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import optuna
 from filelock import FileLock, Timeout
+from optuna.storages.journal import JournalFileBackend, JournalStorage
+from optuna.trial import TrialState
 
 from evoexp.configuration.experiment import Built, Experiment
 from evoexp.configuration.overrides import SWEEP, Choice, Override, Value
@@ -30,6 +33,8 @@ DIGITS = 4  # of a number that is proposed: as many as one types
 REFUSED = "refused"  # attribute of a trial whose settings do not go together: why
 FEWEST = 10  # trials from which on the importance of settings is told
 BEST = 5  # trials that are told from all others for it, a tenth of many (Optuna's advice)
+
+optuna.logging.set_verbosity(optuna.logging.WARNING)  # each trial has its line
 
 
 class SearchSettings(Settings):
@@ -83,15 +88,14 @@ class Search:
         self.num_replicates, self._build = num_replicates, build
         own = build({})
         self._own = [each.condition.id for each in own.values()]
-        changed = set[int]()
-        for key, override in space.items():
-            for value in _probes(override):
-                ids = [each.condition.id for each in self._built({key: value}).values()]
-                changed |= {k for k, own_id in enumerate(self._own) if ids[k] != own_id}
-        if not changed:
+        probes = [{key: value} for key, override in space.items() for value in _probes(override)]
+        rows = [[each.condition.id for each in self._built(probe).values()] for probe in probes]
+        ids = enumerate(self._own)
+        self._changed = [k for k, own_id in ids if any(row[k] != own_id for row in rows)]
+        if not self._changed:
             raise SettingError(SWEEP, "beside values that change a condition", " ".join(space))
-        self._changed = sorted(changed)
-        self.base = dict(each for k, each in enumerate(own.items()) if k in changed)
+        self.base = self._problems(own)
+        self._first = Trial(0, {}, _ids(self.base))
 
     def _built(self, values: Mapping[str, Value]) -> dict[str, Built]:
         """Return all conditions under values of some settings."""
@@ -108,10 +112,13 @@ class Search:
     def _trial(self, number: int, params: Mapping[str, Any]) -> tuple[Trial, dict[str, Built]]:
         """Return a trial, `number` among the finished ones, and its conditions by label."""
         values = {key: _value(override, params[key]) for key, override in self.space.items()}
-        every = list(self._built(values).items())
-        built = dict(every[k] for k in self._changed)
-        ids = tuple(each.condition.id for each in built.values())
-        return Trial(number, self._texts(params), ids), built
+        built = self._problems(self._built(values))
+        return Trial(number, self._texts(params), _ids(built)), built
+
+    def _problems(self, conditions: dict[str, Built]) -> dict[str, Built]:
+        """Return the conditions that the searched settings change."""
+        every = list(conditions.items())
+        return dict(every[k] for k in self._changed)
 
     def _texts(self, params: Mapping[str, Any]) -> dict[str, str]:
         return {key: _value(each, params[key]).text for key, each in self.space.items()}
@@ -124,13 +131,12 @@ class Search:
     @functools.cached_property
     def study(self) -> Any:
         """The study as it is stored; None if there is none."""
-        return self._opened(_optuna().load_study) if self.journal.exists() else None
+        return self._opened(optuna.load_study) if self.journal.exists() else None
 
     def _opened(self, study: Callable[..., Any], **how: bool) -> Any:
-        optuna = _optuna()
-        backend = optuna.storages.journal.JournalFileBackend(str(self.journal))
+        backend = JournalFileBackend(str(self.journal))
         try:
-            storage = optuna.storages.JournalStorage(backend)
+            storage = JournalStorage(backend)
             return study(storage=storage, study_name=self.folder.name, **how)
         except KeyError:  # the journal has no whole line
             return None
@@ -149,10 +155,10 @@ class Search:
         try:
             with FileLock(self.folder / ".lock", timeout=0):
                 self._cut()
-                self.study = self._opened(_optuna().create_study, load_if_exists=True)
+                self.study = self._opened(optuna.create_study, load_if_exists=True)
                 for trial in self.study.get_trials(deepcopy=False):
                     if not trial.state.is_finished():
-                        self.study.tell(trial.number, state=_optuna().trial.TrialState.FAIL)
+                        self.study.tell(trial.number, state=TrialState.FAIL)
                 yield
         except Timeout:
             raise Busy(f"{self.folder}: another process goes on with this search now") from None
@@ -165,13 +171,12 @@ class Search:
 
     def _finished(self) -> list[Any]:
         """Return the trials of the study that have a score, or were refused."""
-        states = _optuna().trial.TrialState
-        finished = {"deepcopy": False, "states": (states.COMPLETE, states.PRUNED)}
-        return [] if self.study is None else list(self.study.get_trials(**finished))
+        states = TrialState.COMPLETE, TrialState.PRUNED
+        return self.study.get_trials(deepcopy=False, states=states) if self.study else []
 
     def ask(self) -> list[Asked]:
         """Return the next trials; none if all are finished. Refused ones are finished at once."""
-        optuna, asked = _optuna(), list[Asked]()
+        asked = list[Asked]()
         distributions = {key: _distribution(override) for key, override in self.space.items()}
         done, at_once = len(self._finished()), self.settings.num_at_once
         for number in range(done + 1, min(done + at_once, self.settings.num_trials) + 1):
@@ -186,24 +191,22 @@ class Search:
                 own = Trial(number, self._texts(trial.params), ())
                 asked.append(Asked(own, {}, trial.number, str(error)))
                 trial.set_user_attr(REFUSED, str(error))
-                self.study.tell(trial, state=optuna.trial.TrialState.PRUNED)
+                self.study.tell(trial, state=TrialState.PRUNED)
         return asked
 
     def _sampler(self, number: int) -> Any:
         """Return a sampler whose proposal depends on nothing but finished trials and a number."""
-        samplers = _optuna().samplers
         seed = int(np.random.SeedSequence((self.settings.seed, number)).generate_state(1)[0])
         if self.settings.sampler == "random":
-            return samplers.RandomSampler(seed=seed)
-        return samplers.TPESampler(seed=seed, constant_liar=self.settings.num_at_once > 1)
+            return optuna.samplers.RandomSampler(seed=seed)
+        return optuna.samplers.TPESampler(seed=seed, constant_liar=self.settings.num_at_once > 1)
 
     def tell(self, asked: Asked) -> float:
         """Judge a trial whose conditions have been run, note its score and return it."""
-        first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
         every = [*self.base.items(), *asked.conditions.items()]
         labelled = [(label, built.condition) for label, built in every]
         found = gather(outputs_root(), labelled, self.num_replicates, self.folder.name, "", "")
-        searched = self._searched((first, asked.trial))
+        searched = self._searched(asked.trial)
         table = score_table(searched, {c.condition.id: c for c in found.conditions})
         score = float(table.loc[table["trial"] > 0, "score"].mean())
         self.study.tell(asked.study_number, score)
@@ -239,8 +242,7 @@ class Search:
 
     def found(self) -> Searched:
         """Return the trials found so far, with the importance of settings."""
-        first = Trial(0, {}, tuple(built.condition.id for built in self.base.values()))
-        found = self._searched((first, *(trial for trial, _ in self.stored)))
+        found = self._searched(*(trial for trial, _ in self.stored))
         refused = {
             " ".join(f"{key}={text}" for key, text in self._texts(trial.params).items()): reason
             for trial in self._finished()
@@ -248,18 +250,18 @@ class Search:
         }
         return found._replace(refused=refused, importance=self._importance())
 
-    def _searched(self, trials: tuple[Trial, ...]) -> Searched:
-        return Searched(tuple(self.base), trials, self.num_replicates, self.settings.unsolved)
+    def _searched(self, *trials: Trial) -> Searched:
+        shared = self.num_replicates, self.settings.unsolved
+        return Searched(tuple(self.base), (self._first, *trials), *shared)
 
     def _importance(self) -> dict[str, float]:
         """Return the importance of each setting for being among the best trials (PED-ANOVA)."""
         num_trials = len(self.stored)
         if num_trials < FEWEST or len(self.space) < 2:
             return {}
-        importance = _optuna().importance
         best = max(0.1, BEST / num_trials)
-        evaluator = importance.PedAnovaImportanceEvaluator(target_quantile=best)
-        return dict(importance.get_param_importances(self.study, evaluator=evaluator))
+        evaluator = optuna.importance.PedAnovaImportanceEvaluator(target_quantile=best)
+        return dict(optuna.importance.get_param_importances(self.study, evaluator=evaluator))
 
 
 def with_search(
@@ -280,18 +282,13 @@ def with_search(
     return experiment.of(search.conditions)._replace(search=search)
 
 
-def _optuna() -> Any:
-    try:
-        import optuna
-    except ImportError:
-        must = "left out: optuna needs pip install 'evoexp[tuning]'"
-        raise SettingError(SWEEP, must, "optuna") from None
-    optuna.logging.set_verbosity(optuna.logging.WARNING)  # each trial has its line below
-    return optuna
+def _ids(conditions: Mapping[str, Built]) -> tuple[str, ...]:
+    return tuple(built.condition.id for built in conditions.values())
 
 
 def _distribution(override: Override) -> Any:
-    distributions, span = _optuna().distributions, override.span
+    distributions: Any = optuna.distributions
+    span = override.span
     if span is None:
         return distributions.CategoricalDistribution([value.text for value in override.values])
     ends: dict[str, Any] = {"low": span.low, "high": span.high, "log": span.is_log}

@@ -138,7 +138,6 @@ def _taken(
                 what = "does not have the hash that is its name, or its run does not refer to it"
                 raise ArchiveError(f"damaged: {name[:30]}… {what}")
             if not (run.path / name).exists():
-                (run.path / name).parent.mkdir(exist_ok=True)
                 write_file(run.path / name, content)
         run.replicates.mkdir(exist_ok=True)
         files = {run.path / name: content for name, content in beside.items()}

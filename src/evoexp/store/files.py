@@ -18,10 +18,13 @@ MAX_NAMED = 3  # damaged files in one line
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Write files, each atomically and durably: a temporary file, fsync, rename.
 
-    No file is renamed before the bytes of all are on the disk, which answers their syncs together.
+    Their folders are made. No file is renamed before the bytes of all are on the disk, which
+    answers their syncs together.
     """
     ending = f".{os.getpid()}{_SUFFIX}"
     files = {path: path.with_name(f".{path.name}{ending}") for path in contents}  # temporary
+    for directory in {path.parent for path in files}:
+        directory.mkdir(parents=True, exist_ok=True)
     try:
         with ThreadPoolExecutor(NUM_THREADS) as threads:  # none begins a file after an error
             list(threads.map(_write, files, files.values(), contents.values()))

@@ -164,7 +164,8 @@ class Log:
         summary = summary._replace(digest=digest)
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
-        self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
+        row = records.flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
+        self._writer.add_metadata(SUMMARY, encode_values(flagged(row)) | content)
         self._writer.finish()
         return Finished(self._buffer.getvalue(), summary)
 
@@ -257,12 +258,6 @@ def encode_generation(row: GenerationRow) -> bytes:
     chain = values.pop("chain")
     terms = {TERM + name: float(row.terms[name]) for name in sorted(row.terms)}
     return encode({**values, **terms, "chain": chain})
-
-
-def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
-    """Return the summary as metadata: every value one JSON text, terms in alphabetical order."""
-    row = records.flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
-    return encode_values(flagged(row))
 
 
 def encode_values(values: Mapping[str, Any]) -> dict[str, str]:

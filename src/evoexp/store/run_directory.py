@@ -20,7 +20,6 @@ from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, DamagedFi
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
 COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
 _RUN = COMMAND.split()[:2]
-_log_name, _failure_name = "{:04d}.mcap".format, "{:04d}.failed.json".format
 _LOG = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.mcap")
 _FAILED = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.failed\.json")
 
@@ -41,11 +40,11 @@ class RunDirectory:
 
     def log_path(self, replicate: int) -> Path:
         """Return where the finished log of a replicate is or will be."""
-        return self.replicates / _log_name(replicate)
+        return self.replicates / f"{replicate:04d}.mcap"
 
     def failure_path(self, replicate: int) -> Path:
         """Return where the reason of a failed replicate is or will be."""
-        return self.replicates / _failure_name(replicate)
+        return self.replicates / f"{replicate:04d}.failed.json"
 
     def create(
         self,
@@ -64,8 +63,7 @@ class RunDirectory:
         contents = {**(files or {}), CONFIG: config_json, MANIFEST: text}
         paths = {self.path / name: content for name, content in contents.items()}
         missing = {path: content for path, content in paths.items() if not path.exists()}
-        for folder in {self.replicates, *(path.parent for path in missing)}:
-            folder.mkdir(parents=True, exist_ok=True)
+        self.replicates.mkdir(parents=True, exist_ok=True)
         write_files(missing)
         sync_directory(self.path.parent)
 
@@ -187,7 +185,6 @@ class RunDirectory:
         plans = self.plans()
         if num_replicates > self.num_asked():
             plans.append(Plan(num_replicates, len(self.completed())))
-            self.path.mkdir(parents=True, exist_ok=True)
             text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
             write_file(self.path / PLANS, text.encode() + b"\n")
 
@@ -213,14 +210,12 @@ class RunDirectory:
 
     def write_logs(self, contents: Mapping[int, bytes]) -> None:
         """Keep finished logs: their replicates are completed, whatever failed before."""
-        self.replicates.mkdir(parents=True, exist_ok=True)
         write_files({self.log_path(k): content for k, content in contents.items()})
         for replicate in contents:
             self.failure_path(replicate).unlink(missing_ok=True)
 
     def write_failure(self, replicate: int, reason: str, traceback: str) -> None:
         """Keep why a replicate failed, a line and the traceback, without this machine's folders."""
-        self.replicates.mkdir(parents=True, exist_ok=True)
         reason, traceback = map(portable, (reason, traceback))
         failure = {"replicate": replicate, "reason": reason, "traceback": traceback}
         write_file(self.failure_path(replicate), json.dumps(failure, indent=2).encode() + b"\n")

@@ -22,7 +22,7 @@ import pandas as pd
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition
 from evoexp.numeric.cache_folder import cache_root, read_kept, write_kept
-from evoexp.numeric.kernel_folders import sources_key
+from evoexp.numeric.compilation import sources_key
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import judge_motion
 from evoexp.records import FloatArray

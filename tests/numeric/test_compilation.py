@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import re
 import shutil
 import stat
 import subprocess
@@ -14,10 +15,9 @@ import numba
 import pytest
 
 import evoexp
-from evoexp.numeric import cache_folder, kernel_folders
+from evoexp.numeric import cache_folder, compilation
 from evoexp.numeric.cache_folder import cache_root, read_kept, write_kept
-from evoexp.numeric.compilation import kernel
-from evoexp.numeric.kernel_folders import LIST, ROOMS_ABOVE, Checksums, list_files, remove_old
+from evoexp.numeric.compilation import LIST, ROOMS_ABOVE, Checksums, kernel, list_files, remove_old
 from matrix import first
 
 SOURCE = Path(evoexp.__file__).parent
@@ -145,7 +145,7 @@ def test_damaged_files_are_removed(listed: Path, name: str, damage: str) -> None
 
 
 def test_files_of_another_user_are_removed(listed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernel_folders, "is_own", lambda path: False)
+    monkeypatch.setattr(compilation, "is_own", lambda path: False)
     assert not is_left(listed)
 
 
@@ -178,7 +178,7 @@ def test_two_processes_at_once_leave_whole_kernels(place: Place) -> None:
 
 @pytest.mark.parametrize("obstacle", first(1, ["no room", "a file"]))
 def test_where_kernels_cannot_be_kept_they_are_compiled(place: Place, obstacle: str) -> None:
-    script = f"from evoexp.numeric import kernel_folders as k; k.LEAST_ROOM = 2**80; {CALL}"
+    script = f"from evoexp.numeric import compilation as k; k.LEAST_ROOM = 2**80; {CALL}"
     if obstacle == "a file":
         script = CALL
         place.cache.mkdir()
@@ -217,7 +217,8 @@ def test_kernels_are_made_of_no_room_above_them() -> None:
         paths = (SOURCE / room).rglob("*.py")
         texts = [path.read_text() for path in paths if "assets/new_" not in path.as_posix()]
         assert (SOURCE / room).is_dir()  # templates of other packages are copied, and not imported
-        assert not [text for text in texts if "evoexp.numeric.compilation" in text]
+        kernels = re.compile("evoexp.numeric.compilation import (?!sources_key\n)")
+        assert not list(filter(kernels.search, texts))
 
 
 # The cache: files that are checked, in a folder that is this user's alone

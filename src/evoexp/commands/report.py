@@ -170,6 +170,10 @@ def request_of(
 
     Behind the overrides come the words of the options, see `option_words`.
     """
+    search = experiment.search
+    if search is not None and not search.stored:
+        must = "no trial of this search is stored; evoexp run with the same words starts it"
+        raise NothingStored(f"{experiment.report_name}: {must}")
     files = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
     words = [experiment.name] if experiment.name in options("experiment") else []
     words = files if any(map(is_file, files)) else words
@@ -185,7 +189,7 @@ def request_of(
         experiment.num_replicates,
         shlex.join(words),
         experiment.options,
-        searched=experiment.search.found() if experiment.search else None,
+        searched=search.found() if search else None,
     )
 
 

@@ -5,7 +5,6 @@ import contextlib
 import functools
 import hashlib
 import importlib.util
-import re
 import shlex
 import sys
 import tempfile
@@ -142,36 +141,32 @@ def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> 
     search = experiment.search
     if search is None:
         return
-    fixed = [
-        word
-        for word in overrides
-        if word.partition("=")[0] not in search.space and not re.match(rf"{SWEEP}[.=]", word)
-    ]
+    given = {word: compose.parse(word) for word in overrides}
+    kept = {w: each for w, each in given.items() if each.key not in search.space}
+    fixed = [word for word, each in kept.items() if each.root != SWEEP]
+    fixed += ["-m"] * any(each.is_swept for each in kept.values())
+
+    def typed(trial: "Trial") -> list[str]:
+        settings = trial.settings.items()
+        return [f"{search.space[key].prefix}{key}={text}" for key, text in settings]
 
     def asked_for(trial: "Trial", conditions: dict[str, Built]) -> tuple[Experiment, list[str]]:
         return experiment.of(conditions), [*fixed, *typed(trial)]
 
     with search.held():
         stored = (asked_for(*each) for each in search.stored)
-        runs.complete([(experiment.of(search.base), fixed), *stored])
-        best, total = search.best(), search.settings.num_trials
+        runs.complete([(experiment.of(search.base), fixed), *stored], told=False)
+        best, total = search.score(search.first, {}), search.settings.num_trials
+        say(f"trial 0 of {total}: score {best:.4g} · the experiment as it is")
+        best = min([best, *search.scores])
         while asked := search.ask():
-            if taken := [each for each in asked if not each.refusal]:
-                runs.complete(
-                    [asked_for(each.trial, each.conditions) for each in taken], told=False
-                )
-            for each in asked:
-                told = f"refused: {each.refusal}"
-                if not each.refusal:
-                    score = search.tell(each)
-                    best = min(best, score)
-                    told = f"score {score:.4g}, best {best:.4g}"
-                say(f"trial {each.trial.number} of {total}: {told} · {' '.join(typed(each.trial))}")
-
-
-def typed(trial: "Trial") -> list[str]:
-    """Return the settings of a trial as one types them."""
-    return [f"{key}={text}" for key, text in trial.settings.items()]
+            told = f"refused: {asked.refusal}"
+            if not asked.refusal:
+                runs.complete([asked_for(asked.trial, asked.conditions)], told=False)
+                score = search.tell(asked)
+                best = min(best, score)
+                told = f"score {score:.4g}, best {best:.4g}"
+            say(f"trial {asked.trial.number} of {total}: {told} · {' '.join(typed(asked.trial))}")
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:

@@ -116,7 +116,8 @@ def parse(text: str) -> Override:
 
 def _span(key: str, interval: Any, typed: str) -> Span:
     low, high, is_log = interval.start, interval.end, "log" in interval.tags
-    if key in groups() or not -math.inf < low < high < math.inf or (is_log and low <= 0):
+    is_plain = key not in groups() and interval.tags <= {"log"}
+    if not is_plain or not -math.inf < low < high < math.inf or (is_log and low <= 0):
         must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
         raise SettingError(key, must, typed)
     return Span(low, high, 1 if isinstance(low, int) else None, is_log)

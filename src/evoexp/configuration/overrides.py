@@ -140,7 +140,8 @@ def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
     """Refuse overrides that are swept over but may not be."""
     for key, override in overrides.items():
         if override.span is not None and override.span.is_interval:
-            must = "values that can be enumerated: a,b,c or range(…) (or searched by sweep=optuna)"
+            must = "values that can be enumerated: a,b,c or range(…)"
+            must += " (or searched by sweep=optuna)" if override.root in SEARCHED else ""
             raise SettingError(key, must, override.typed)
         if override.is_swept and not multirun:
             raise SettingError(key, "one value (or add -m to sweep over several)", override.typed)

@@ -41,7 +41,6 @@ class SearchSettings(Settings):
     """Settings of `conf/sweep`."""
 
     num_trials: Count  # beside the experiment as it is; those already finished count
-    num_at_once: Count  # trials that are asked for together and run side by side
     sampler: Literal["tpe", "random"]  # of Optuna
     unsolved: Positive  # score of a run without a proven answer, see `score_table`
     seed: NonNegativeCount  # of the sampler
@@ -87,15 +86,19 @@ class Search:
         self.settings, self.space, self.folder = settings, space, folder
         self.num_replicates, self._build = num_replicates, build
         own = build({})
+        references = [built.condition.is_reference for built in own.values()]
         self._own = [each.condition.id for each in own.values()]
         probes = [{key: value} for key, override in space.items() for value in _probes(override)]
         rows = [[each.condition.id for each in self._built(probe).values()] for probe in probes]
-        ids = enumerate(self._own)
-        self._changed = [k for k, own_id in ids if any(row[k] != own_id for row in rows)]
+        self._changed = [
+            k
+            for k, own_id in enumerate(self._own)
+            if not references[k] and any(row[k] != own_id for row in rows)
+        ]
         if not self._changed:
             raise SettingError(SWEEP, "beside values that change a condition", " ".join(space))
         self.base = self._problems(own)
-        self._first = Trial(0, {}, _ids(self.base))
+        self.first = Trial(0, {}, _ids(self.base))
 
     def _built(self, values: Mapping[str, Value]) -> dict[str, Built]:
         """Return all conditions under values of some settings."""
@@ -174,48 +177,47 @@ class Search:
         states = TrialState.COMPLETE, TrialState.PRUNED
         return self.study.get_trials(deepcopy=False, states=states) if self.study else []
 
-    def ask(self) -> list[Asked]:
-        """Return the next trials; none if all are finished. Refused ones are finished at once."""
-        asked = list[Asked]()
-        distributions = {key: _distribution(override) for key, override in self.space.items()}
-        done, at_once = len(self._finished()), self.settings.num_at_once
-        for number in range(done + 1, min(done + at_once, self.settings.num_trials) + 1):
-            self.study.sampler = self._sampler(number)
-            trial = self.study.ask(distributions)
-            try:
-                own, conditions = self._trial(number, trial.params)
-                for built in conditions.values():
-                    built.condition.prepare()  # refuses what does not go together
-                asked.append(Asked(own, conditions, trial.number))
-            except EvoexpError as error:
-                own = Trial(number, self._texts(trial.params), ())
-                asked.append(Asked(own, {}, trial.number, str(error)))
-                trial.set_user_attr(REFUSED, str(error))
-                self.study.tell(trial, state=TrialState.PRUNED)
-        return asked
+    def ask(self) -> Asked | None:
+        """Return the next trial; None if all are finished. A refused one is finished at once."""
+        number = len(self._finished()) + 1
+        if number > self.settings.num_trials:
+            return None
+        self.study.sampler = self._sampler(number)
+        trial = self.study.ask({key: _distribution(each) for key, each in self.space.items()})
+        try:
+            own, conditions = self._trial(number, trial.params)
+            for built in conditions.values():
+                built.condition.prepare()  # refuses what does not go together
+        except EvoexpError as error:
+            trial.set_user_attr(REFUSED, str(error))
+            self.study.tell(trial, state=TrialState.PRUNED)
+            return Asked(Trial(number, self._texts(trial.params), ()), {}, trial.number, str(error))
+        return Asked(own, conditions, trial.number)
 
     def _sampler(self, number: int) -> Any:
         """Return a sampler whose proposal depends on nothing but finished trials and a number."""
         seed = int(np.random.SeedSequence((self.settings.seed, number)).generate_state(1)[0])
-        if self.settings.sampler == "random":
-            return optuna.samplers.RandomSampler(seed=seed)
-        return optuna.samplers.TPESampler(seed=seed, constant_liar=self.settings.num_at_once > 1)
+        kinds = {"tpe": optuna.samplers.TPESampler, "random": optuna.samplers.RandomSampler}
+        return kinds[self.settings.sampler](seed=seed)
+
+    def score(self, trial: Trial, conditions: Mapping[str, Built]) -> float:
+        """Judge a trial whose conditions have been run, or with none the experiment as it is."""
+        labelled = [(k, built.condition) for k, built in [*self.base.items(), *conditions.items()]]
+        found = gather(outputs_root(), labelled, self.num_replicates, self.folder.name, "", "")
+        searched = self._searched(*[trial] * bool(conditions))
+        table = score_table(searched, {c.condition.id: c for c in found.conditions})
+        return float(table.loc[table["trial"] == trial.number, "score"].mean())
 
     def tell(self, asked: Asked) -> float:
-        """Judge a trial whose conditions have been run, note its score and return it."""
-        every = [*self.base.items(), *asked.conditions.items()]
-        labelled = [(label, built.condition) for label, built in every]
-        found = gather(outputs_root(), labelled, self.num_replicates, self.folder.name, "", "")
-        searched = self._searched(asked.trial)
-        table = score_table(searched, {c.condition.id: c for c in found.conditions})
-        score = float(table.loc[table["trial"] > 0, "score"].mean())
+        """Judge a trial, note its score and return it."""
+        score = self.score(asked.trial, asked.conditions)
         self.study.tell(asked.study_number, score)
         return score
 
-    def best(self) -> float:
-        """Return the least score so far; infinite before the first."""
-        scores = (trial.value for trial in self._finished() if trial.value is not None)
-        return min(scores, default=math.inf)
+    @property
+    def scores(self) -> list[float]:
+        """The scores of the finished trials that were not refused."""
+        return [trial.value for trial in self._finished() if trial.value is not None]
 
     @functools.cached_property
     def stored(self) -> list[tuple[Trial, dict[str, Built]]]:
@@ -237,7 +239,7 @@ class Search:
     @property
     def best_conditions(self) -> dict[str, Built]:
         """The conditions of the problems and of the stored trial of the least score, by label."""
-        scores = [trial.value for trial in self._finished() if trial.value is not None]
+        scores = self.scores
         return self.base | (self.stored[scores.index(min(scores))][1] if self.stored else {})
 
     def found(self) -> Searched:
@@ -252,14 +254,15 @@ class Search:
 
     def _searched(self, *trials: Trial) -> Searched:
         shared = self.num_replicates, self.settings.unsolved
-        return Searched(tuple(self.base), (self._first, *trials), *shared)
+        return Searched(tuple(self.base), (self.first, *trials), *shared)
 
     def _importance(self) -> dict[str, float]:
         """Return the importance of each setting for being among the best trials (PED-ANOVA)."""
-        num_trials = len(self.stored)
-        if num_trials < FEWEST or len(self.space) < 2:
+        scores = sorted(self.scores)
+        num_best = max(BEST, len(scores) // 10)
+        if len(scores) < FEWEST or len(self.space) < 2 or scores[num_best - 1] == scores[-1]:
             return {}
-        best = max(0.1, BEST / num_trials)
+        best = num_best / len(scores)
         evaluator = optuna.importance.PedAnovaImportanceEvaluator(target_quantile=best)
         return dict(optuna.importance.get_param_importances(self.study, evaluator=evaluator))
 
@@ -271,7 +274,8 @@ def with_search(
     build: Callable[[Choice], dict[str, Built]],
 ) -> Experiment:
     """Return an experiment whose conditions are the finished trials of a search, see `Search`."""
-    words = sorted(override.text for override in space.values())
+    space = dict(sorted(space.items()))  # whatever the order in which it was typed
+    words = [override.text for override in space.values()]
     own = [condition.id for _, condition in experiment.conditions]
     # whatever a proposal or a score depends on
     about = [words, own, experiment.num_replicates, settings.model_dump(exclude={"num_trials"})]
@@ -303,8 +307,11 @@ def _value(override: Override, proposed: Any) -> Value:
         return next(value for value in override.values if value.text == proposed)
     if isinstance(proposed, int):
         return Value(str(proposed), proposed)
-    text = f"{proposed:.{DIGITS}g}"
-    return Value(text, float(text))
+    if not override.span.is_interval:
+        return min(override.values, key=lambda value: abs(value.data - proposed))
+    rounded = float(f"{proposed:.{DIGITS}g}")
+    number = min(max(rounded, override.span.low), override.span.high)
+    return Value(f"{number:.12g}", number)
 
 
 def _probes(override: Override) -> Iterator[Value]:

@@ -48,8 +48,9 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> Row
     """Return the score of every trial on every problem.
 
     A run that is proven counts its cost, divided by the mean cost of the proven runs of trial 0 on
-    the same problem (of all its runs where none is proven), `unsolved` at most; any other run
-    counts `unsolved`. The score of a trial is the mean over runs and problems.
+    the same problem (of all its runs where none is proven; 1 where that is not above 0),
+    `unsolved` at most; any other run counts `unsolved`. The score of a trial is the mean over runs
+    and problems.
 
     Args:
         searched: Problems and trials.
@@ -69,8 +70,9 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> Row
                 finite = costs if len(costs) else every[np.isfinite(every)]
                 references[problem] = float(finite.mean()) if len(finite) else np.inf
             reference = references[problem]
-            ratios = costs / reference if np.isfinite(reference) else np.ones(len(costs))
-            ratios = np.minimum(ratios, searched.unsolved)
+            is_scale = 0.0 < reference < np.inf
+            ratios = costs / reference if is_scale else np.ones(len(costs))
+            ratios = np.clip(ratios, 0.0, searched.unsolved)
             missing = searched.num_replicates - len(costs)
             score = (ratios.sum() + searched.unsolved * missing) / searched.num_replicates
             queries = runs[key].column("collision_queries")[first].mean() if first.any() else 0.0
@@ -123,7 +125,8 @@ def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) ->
 
 def best_trial_rows(searched: Searched, trials: pd.DataFrame) -> Rows:
     """Yield a row for each of the best trials, and for the experiment as it is."""
-    best = trials.sort_values("score", kind="stable").head(MOST_ROWS)
+    different = trials.drop_duplicates(["score", *searched.trials[-1].settings])
+    best = different.sort_values("score", kind="stable").head(MOST_ROWS)
     for row in records(pd.concat([best, trials[:1]]).drop_duplicates("trial")):
         words = next(words_of(each) for each in searched.trials if each.number == row.trial)
         yield (
@@ -161,7 +164,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "effort_differs": lambda trials: (
         trials["queries"].max() > MUCH_MORE * trials["queries"].iloc[0]
     ),
-    "has_trials": lambda searched: len(searched.trials) > 1,
+    "is_improved": lambda best_trial: best_trial.number > 0,
     "importance": lambda searched: searched.importance,
     "refused_rows": lambda searched: tuple(searched.refused.items()),
     "conditions_of_best": lambda results: best_of(results).conditions,

@@ -115,10 +115,7 @@ class Component(Settings):
 
 
 def build(
-    data: Any,
-    lookup: Callable[[str, str], type[Component]],
-    field: str,
-    largest: float = LARGEST,
+    data: Any, lookup: Callable[[str, str], type[Component]], field: str, largest: float = LARGEST
 ) -> Any:
     """Build plain data into components, the innermost first.
 

@@ -104,6 +104,8 @@ def main(arguments: argparse.Namespace) -> int:
         )
     say(table)
     say(_total(planned, experiments[0].runner.num_workers or num_cores()))
+    for search in filter(None, (experiment.search for experiment in experiments)):
+        say(f"trials: {len(search.scores)} of {search.settings.num_trials} are stored")
     return 0
 
 

@@ -156,14 +156,14 @@ def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> 
     with search.held():
         stored = (asked_for(*each) for each in search.stored)
         runs.complete([(experiment.of(search.base), fixed), *stored], told=False)
-        best, total = search.score(search.first, {}), search.settings.num_trials
+        best, total = search.score(), search.settings.num_trials
         say(f"trial 0 of {total}: score {best:.4g} · the experiment as it is")
         best = min([best, *search.scores])
         while asked := search.ask():
             told = f"refused: {asked.refusal}"
             if not asked.refusal:
                 runs.complete([asked_for(asked.trial, asked.conditions)], told=False)
-                score = search.tell(asked)
+                score = search.score(asked)
                 best = min(best, score)
                 told = f"score {score:.4g}, best {best:.4g}"
             say(f"trial {asked.trial.number} of {total}: {told} · {' '.join(typed(asked.trial))}")

@@ -84,6 +84,7 @@ class Search:
             EvoexpError: If a value is refused.
         """
         self.settings, self.space, self.folder = settings, space, folder
+        self.journal = folder / "journal.log"
         self.num_replicates, self._build = num_replicates, build
         own = build({})
         references = [built.condition.is_reference for built in own.values()]
@@ -125,11 +126,6 @@ class Search:
 
     def _texts(self, params: Mapping[str, Any]) -> dict[str, str]:
         return {key: _value(each, params[key]).text for key, each in self.space.items()}
-
-    @property
-    def journal(self) -> Path:
-        """The file of the study."""
-        return self.folder / "journal.log"
 
     @functools.cached_property
     def study(self) -> Any:
@@ -200,18 +196,16 @@ class Search:
         kinds = {"tpe": optuna.samplers.TPESampler, "random": optuna.samplers.RandomSampler}
         return kinds[self.settings.sampler](seed=seed)
 
-    def score(self, trial: Trial, conditions: Mapping[str, Built]) -> float:
-        """Judge a trial whose conditions have been run, or with none the experiment as it is."""
+    def score(self, asked: Asked | None = None) -> float:
+        """Judge a trial that has been run and note its score; None: the experiment as it is."""
+        trial, conditions = (asked.trial, asked.conditions) if asked else (self.first, {})
         labelled = [(k, built.condition) for k, built in [*self.base.items(), *conditions.items()]]
         found = gather(outputs_root(), labelled, self.num_replicates, self.folder.name, "", "")
-        searched = self._searched(*[trial] * bool(conditions))
+        searched = self._searched(*[trial] * bool(asked))
         table = score_table(searched, {c.condition.id: c for c in found.conditions})
-        return float(table.loc[table["trial"] == trial.number, "score"].mean())
-
-    def tell(self, asked: Asked) -> float:
-        """Judge a trial, note its score and return it."""
-        score = self.score(asked.trial, asked.conditions)
-        self.study.tell(asked.study_number, score)
+        score = float(table.loc[table["trial"] == trial.number, "score"].mean())
+        if asked:
+            self.study.tell(asked.study_number, score)
         return score
 
     @property
@@ -239,8 +233,7 @@ class Search:
     @property
     def best_conditions(self) -> dict[str, Built]:
         """The conditions of the problems and of the stored trial of the least score, by label."""
-        scores = self.scores
-        return self.base | (self.stored[scores.index(min(scores))][1] if self.stored else {})
+        return self.base | (self.stored[np.argmin(self.scores)][1] if self.stored else {})
 
     def found(self) -> Searched:
         """Return the trials found so far, with the importance of settings."""

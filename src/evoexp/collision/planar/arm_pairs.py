@@ -297,13 +297,7 @@ def _links_meet(one: Links, two: Links, tolerance: float) -> Mask:
 
 @inlined
 def _envelopes_touch(
-    arm_1: Arm,
-    one: Links,
-    turns_1: Line,
-    arm_2: Arm,
-    two: Links,
-    turns_2: Line,
-    bounds: Bounds,
+    arm_1: Arm, one: Links, turns_1: Line, arm_2: Arm, two: Links, turns_2: Line, bounds: Bounds
 ) -> Mask:
     """Return whether a boundary line or the circle of one arm meets one of another.
 

@@ -133,11 +133,7 @@ def _note(
 
 @inlined
 def _sweep(
-    arm: PlanarArm,
-    ellipses: Ellipses,
-    path: TestedPath,
-    first_position: int,
-    checks: PathChecks,
+    arm: PlanarArm, ellipses: Ellipses, path: TestedPath, first_position: int, checks: PathChecks
 ) -> Vector:
     """Test the positions of a block from one on, and perhaps the chords of all link ends before."""
     gaps, x, y = spread(1.0), checks.x, checks.y

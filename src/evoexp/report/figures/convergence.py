@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
 from evoexp.report.figures.marks import name_curves, name_ends
@@ -76,10 +77,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw best and average fitness over the whole range, and the best fitness enlarged."""
     figure, (whole, close) = style.panels(4.1, 2)
     best = table[table["quantity"] == NAMES["best_cost"]]
-    for axes, shown, title in (
-        (whole, table, "a  whole range"),
-        (close, best, "b  best fitness"),
-    ):
+    for axes, shown, title in ((whole, table, "a  whole range"), (close, best, "b  best fitness")):
         _curves(axes, shown)
         axes.set(ylabel="fitness F [-]", title=title)
     finite = best[np.isfinite(best[["median", "lower", "upper"]]).all(axis=1)]
@@ -311,70 +309,49 @@ def draw_facets(table: pd.DataFrame) -> Figure:
     return figure
 
 
-NUMBERS = ("trial", "score", "best", "proven", "runs", "queries")  # columns of no setting
-MOST_SETTINGS = 9  # panels of a figure
 HIGHEST = 1.5  # score at the top of a panel, in that of the experiment as it is
 ORDERS = 30.0  # ratio of the ends of an axis from which on it is logarithmic
+TRIAL = "trial"  # the axis of the first panel; the others are settings
 
 
-def draw_history(table: pd.DataFrame) -> Figure:
-    """Draw the score of every trial and the best one so far."""
-    figure, (axes,) = style.panels(2.9)
-    _draw_scores(axes, table, table["trial"], color=style.NEUTRAL)
-    colour = style.condition_colour(0)
-    axes.step(table["trial"], table["best"], where="post", color=colour, label="best so far")
-    axes.set(xlabel="trial", ylabel="score")
-    style.legend_below(figure, [axes], 2)
-    return figure
+@table_of("axis importance trial value score best proven runs queries")
+def trials_table(trials: pd.DataFrame, importance: Mapping[str, float]) -> Rows:
+    """Yield every trial over its number, and over each setting."""
+    numbers = ("score", "best", "proven", "runs", "queries")
+    for axis in (str(name) for name in trials if name not in numbers):
+        for trial in trials.to_dict("records"):
+            own = importance.get(axis, np.nan), trial[TRIAL], str(trial[axis])
+            yield axis, *own, *(trial[name] for name in numbers)
 
 
-def draw_slices(table: pd.DataFrame) -> Figure:
-    """Draw the score over each setting; later trials are darker."""
-    shown = [str(key) for key in table if key not in NUMBERS][:MOST_SETTINGS]
-    figure, panels = style.panels(2.3, len(shown), PER_LINE, 0.3, sharey=True)
-    look: dict[str, Any] = {"edgecolors": style.NEUTRAL, "linewidths": 0.4, "cmap": "Blues"}
-    for axes, key in zip(panels, shown, strict=True):
-        values = pd.to_numeric(table[key], errors="coerce")
-        if values[1:].isna().any():  # words
-            names = sorted(table[key][1:].unique())
-            values = table[key].map({name: k for k, name in enumerate(names)})
-            axes.set_xticks(range(len(names)), names)
+def draw_trials(table: pd.DataFrame) -> Figure:
+    """Draw the score of each trial over its number and over each setting; later ones darker."""
+    names = list(table["axis"].unique())[:MOST_PANELS]
+    figure, panels = style.panels(2.3, len(names), PER_LINE, 0.3, sharey=True)
+    own, count = float(table["score"].iloc[0]), int(table["trial"].max())
+    for axes, name in zip(panels, names, strict=True):
+        trials = table[table["axis"] == name]
+        if name == TRIAL:
+            axes.step(trials["trial"], trials["best"], where="post", label="best so far")
+            axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+        trials = trials[trials["trial"] > 0]
+        places = pd.to_numeric(trials["value"], errors="coerce")
+        if places.isna().any():  # words
+            words = sorted(trials["value"].unique())
+            places = trials["value"].map({word: k for k, word in enumerate(words)})
+            axes.set_xticks(range(len(words)), words)
             axes.margins(x=0.2)
-        elif values.min() > 0.0 and values.max() > ORDERS * values.min():
+        elif places.min() > 0.0 and places.max() > ORDERS * places.min():
             axes.set_xscale("log")
-        _draw_scores(axes, table, values, c=table["trial"][1:], vmin=-len(table) / 2, **look)
-        axes.set_xlabel(key)
-        axes.set_ylabel("score" if style.begins_line(axes) else "")
-    style.legend_below(figure, panels, 1)
-    return figure
-
-
-def _draw_scores(axes: Axes, table: pd.DataFrame, places: Any, **look: Any) -> None:
-    """Draw the scores of trials; those far above that of the experiment as it is at the top."""
-    own, top = float(table["score"].iloc[0]), HIGHEST * float(table["score"].iloc[0])
-    for is_above, marker in ((False, "o"), (True, "^")):
-        rows = (table["trial"] > 0) & ((table["score"] > top) == is_above)
-        parts = {"c": look["c"][rows[1:]], "vmax": len(table)} if "c" in look else {}
-        scores = table["score"][rows].clip(upper=top)
-        axes.scatter(places[rows], scores, marker=marker, s=18, zorder=2, **{**look, **parts})
-    axes.axhline(own, color="black", linestyle="--", linewidth=0.8, label="the experiment as it is")
-
-
-def importance_table(importance: Mapping[str, float]) -> pd.DataFrame:
-    """Return columns setting, importance (shares that sum to 1), the largest first."""
-    return pd.DataFrame(
-        {"setting": list(importance), "importance": list(importance.values())}
-    ).sort_values("importance", ascending=False, ignore_index=True)
-
-
-def draw_importance(table: pd.DataFrame) -> Figure:
-    """Draw the importance of the settings as bars."""
-    figure, (axes,) = style.panels(0.3 * len(table) + 0.9)
-    places = np.arange(len(table))
-    axes.barh(places, table["importance"], color=style.condition_colour(0), height=0.6)
-    for place, share in zip(places, table["importance"], strict=True):
-        marks.beside(axes, place, f"{share:.2f}")
-    axes.set_yticks(places, table["setting"])
-    axes.set(xlabel="importance", xlim=(0.0, 1.0), ylim=(len(table) - 0.5, -0.5))
-    axes.grid(visible=False, axis="y")
+        for is_above, marker in ((False, "o"), (True, "^")):
+            rows = (trials["score"] > HIGHEST * own) == is_above
+            look: dict[str, Any] = {"c": trials["trial"][rows], "vmin": -count / 2, "vmax": count}
+            look |= {"cmap": "Blues", "edgecolors": style.NEUTRAL, "linewidths": 0.4, "zorder": 2}
+            scores = trials["score"][rows].clip(upper=HIGHEST * own)
+            axes.scatter(places[rows], scores, marker=marker, s=18, **look)
+        axes.axhline(own, color="black", ls="--", lw=0.8, label="the experiment as it is")
+        share = trials["importance"].iloc[0] if len(trials) else np.nan
+        axes.set_title("" if np.isnan(share) else f"importance {share:.2f}", fontweight="normal")
+        axes.set(xlabel=name, ylabel="score" if style.begins_line(axes) else "")
+    style.legend_below(figure, panels, 2)
     return figure

@@ -160,7 +160,6 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         searched, {c.condition.id: c for c in results.conditions}
     ),
     "trials": lambda searched, search_scores: trial_table(searched, search_scores),
-    "importance_is_known": lambda searched: bool(searched.importance),
     "effort_differs": lambda trials: (
         trials["queries"].max() > MUCH_MORE * trials["queries"].iloc[0]
     ),

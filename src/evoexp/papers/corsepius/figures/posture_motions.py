@@ -324,8 +324,7 @@ def draw_trap(table: pd.DataFrame) -> Figure:
 
 
 @table_of(
-    f"position robot element name {' '.join(trails.COLUMNS)} inflation length_unit",
-    is_rounded=True,
+    f"position robot element name {' '.join(trails.COLUMNS)} inflation length_unit", is_rounded=True
 )
 def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> Iterator[tuple[object, ...]]:
     """Return bodies and covers of robots at their start, of (title, a condition of the robot)."""

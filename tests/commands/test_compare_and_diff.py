@@ -62,7 +62,7 @@ def test_given_runs_stand_beside_ours(evoexp: Evoexp, stored: Path, tmp_path: Pa
     for option, file, message in (
         ("--data", data, "given.csv, line 2, cost: must be a length"),
         ("--data", tmp_path / "no.csv", "No such file"),
-        ("--csv", tmp_path / "no" / "table.csv", "No such file"),
+        ("--csv", data / "table.csv", "File exists"),
     ):
         said = evoexp("compare", "rana_planar", *SERIAL, option, str(file))
         assert said.code == 2 and message in said.err and said.err.count("\n") == 1

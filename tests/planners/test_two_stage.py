@@ -89,7 +89,7 @@ def test_the_first_stage_has_no_plan_yet() -> None:
 def test_a_mission_is_over_a_floor() -> None:
     given: Any = mission()
     grid = given.scenario.grid.model_copy(update={"size": (4, 4, 4)})
-    with pytest.raises(SettingError, match=r"scenario\.grid\.size: must be of a floor"):
+    with pytest.raises(SettingError, match=r"scenario\.grid\.size: must be two numbers"):
         given.planner.prepare(given.robot, given.scenario.model_copy(update={"grid": grid}))
 
 

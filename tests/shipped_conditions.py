@@ -14,7 +14,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from matrix import examples
 
-KINDS = range(267)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
+KINDS = range(264)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
 EXAMPLES = (  # (experiment, number of its condition): every planner, and its rarer parts
     ("rana_obstacles", 0),
     ("rana_planar", 1),  # random search

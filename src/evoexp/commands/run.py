@@ -96,7 +96,7 @@ class Runs:
     ) -> None:
         """Run the missing replicates of experiments, each asked for by its overrides.
 
-        Not `told`, it leaves no line behind.
+        Not `told`, it leaves no line on replicates behind.
         """
         again, wanted = option_words(self._arguments), []
         for experiment, overrides in asked:
@@ -107,6 +107,8 @@ class Runs:
                 wanted.append((each, count, experiment.origin(label, command)))
         settings, retry = (self._runner, outputs_root()), self._arguments.retry_failed
         batch = Batch(wanted, *settings, retry_failed=retry, curves=self._curves)
+        if batch.jobs and not any((cache_root() / "kernels").glob("*/*/*")):
+            say("kernels are compiled first: some minutes, once on this machine")
         batch.prepare()
         self.num_left += batch.num_left_failed
         if not batch.jobs:
@@ -119,9 +121,6 @@ class Runs:
         if told:
             counts = " or ".join(map(str, planned))
             say(f"replicates of each condition, fixed before they run: {counts}")
-            kernels = cache_root() / "kernels"
-            if not (kernels.is_dir() and any(kernels.iterdir())):
-                say("kernels are compiled first: some minutes, once on this machine")
         counted = Counter(job.condition_id for job in batch.jobs)
         missing = {
             c.id: (notes["label"], counted[c.id]) for c, _, notes in wanted if c.id in counted

@@ -323,6 +323,11 @@ def test_grids_hold_every_combination(two_settings: Any) -> None:
     assert all(f">{value:.4g}<".encode() in figure for value in cells.values() if value < 100.0)
 
 
+def test_a_setting_that_is_the_same_everywhere_is_no_axis() -> None:
+    sweep = sweep_of(fake([(f"GA · x={x} · planner=ompl", [1.0]) for x in "12"]))
+    assert (sweep.settings, sweep.bases, sweep.levels(0)) == (("x",), ("GA",), ("1", "2"))
+
+
 def test_three_settings_have_a_panel_for_each_value_of_the_first() -> None:
     labels = [f"mode={m} · x={x} · y={y}" for m, x, y in itertools.product("ab", "12", "34")]
     sweep = sweep_of(fake([(label, [1.0, 2.0]) for label in labels]))

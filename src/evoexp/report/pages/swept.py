@@ -22,7 +22,6 @@ from evoexp.report.statistics.comparisons import Values, by_column
 
 JOIN = " · "  # between the parts of a label
 _SETTING = re.compile(r"([\w.@/-]+)=(.*)")
-FEWEST = 2  # combinations of values that are a sweep
 MOST_PANELS = 18  # of a figure
 
 
@@ -56,22 +55,27 @@ class Sweep(NamedTuple):
 
 def sweep_of(results: Results) -> Sweep | None:
     """Return the sweep that these results are; None if they are none."""
-    swept, names = list[Swept](), set[tuple[str, ...]]()
-    for c in results.conditions:
-        if c.is_reference:
-            continue
-        # the base of a label, and the settings behind it
-        parts, settings = c.label.split(JOIN), dict[str, str]()
-        while parts and (found := _SETTING.fullmatch(parts[-1])) and found[1] not in settings:
-            settings = {found[1]: found[2], **settings}
-            parts.pop()
-        names.add(tuple(settings))
-        swept.append(Swept(JOIN.join(parts), tuple(settings.values()), c))
-    combinations = {each.values for each in swept}
-    is_repeated = len({each[:2] for each in swept}) < len(swept)
-    if len(names) != 1 or () in names or len(combinations) < FEWEST or is_repeated:
+    conditions = [c for c in results.conditions if not c.is_reference]
+    labels = [_split(c.label) for c in conditions]
+    if len({tuple(settings) for _, settings in labels}) != 1:
         return None
-    return Sweep(names.pop(), tuple(swept))
+    # a setting that is the same in all conditions is no axis
+    names = [name for name in labels[0][1] if len({settings[name] for _, settings in labels}) > 1]
+    swept = tuple(
+        Swept(base, tuple(map(settings.__getitem__, names)), c)
+        for (base, settings), c in zip(labels, conditions, strict=True)
+    )
+    is_repeated = len({condition[:2] for condition in swept}) < len(swept)
+    return None if not names or is_repeated else Sweep(tuple(names), swept)
+
+
+def _split(label: str) -> tuple[str, dict[str, str]]:
+    """Return the base of a label, and the settings that it ends with."""
+    parts, settings = label.split(JOIN), dict[str, str]()
+    while parts and (match := _SETTING.fullmatch(parts[-1])) and match[1] not in settings:
+        settings = {match[1]: match[2], **settings}
+        parts.pop()
+    return JOIN.join(parts), settings
 
 
 @table_of("base setting first other pairs difference low high better")

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from evoexp.errors import EvoexpError, SettingError, brief
+from evoexp.errors import EvoexpError, SettingError, brief, demand
 from evoexp.input_files import MAX_INPUT, read_bounded
 from evoexp.validation import Settings
 
@@ -80,13 +80,15 @@ def read(path: Any, folders: Sequence[Path], field: str) -> str:
     return keep(file_content(existing[0] if existing else path, field))
 
 
-def file_content(path: Any, field: str, limit: int = MAX_INPUT) -> bytes:
+def file_content(
+    path: Any, field: str, limit: int = MAX_INPUT, must: str = "a file that can be read"
+) -> bytes:
     """Read a file of at most `limit` bytes, which may be one that evoexp ships."""
     try:
         return read_bounded(located(str(path)), limit)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
+        raise SettingError(field, f"{must} ({reason})", str(path)) from None
 
 
 def attached(config: Any) -> dict[str, bytes]:
@@ -113,14 +115,12 @@ def package_folders(setting: Any, field: str) -> dict[str, Path]:
     """Check the setting, name of each package → its folder, that tells where packages lie."""
     if setting is None:
         return {}
-    if not isinstance(setting, Mapping):
-        must = "folders of packages by their names, {name: folder}"
-        raise SettingError(field, must, setting)
+    must = "folders of packages by their names, {name: folder}"
+    demand(isinstance(setting, Mapping), field, must, setting)
     folders = {str(name): Path(located(str(folder))) for name, folder in setting.items()}
     for name, folder in folders.items():
-        if not os.path.isdir(folder):
-            must = f"the folder of the package '{name}'"
-            raise SettingError(f"{field}.{name}", must, setting[name])
+        must = f"the folder of the package '{name}'"
+        demand(os.path.isdir(folder), f"{field}.{name}", must, setting[name])
     return folders
 
 
@@ -143,14 +143,9 @@ def mesh_content(name: str, file: Path, packages: Mapping[str, Path], field: str
             places += f"; {setting}={{NAME: FOLDER}} and {PACKAGE_PATHS} tell where packages lie"
         must = "a file whose meshes exist"
         raise SettingError(field, must, f"a missing mesh '{name}'", brief(places, MOST_PLACES))
-    if place.resolve().suffix.lower() not in MESHES:
-        must = f"a file whose meshes are files that end in {', '.join(MESHES)}"
-        raise SettingError(field, must, name)
-    try:
-        return read_bounded(place)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError(field, f"a file whose meshes can be read ({reason})", name) from None
+    must = f"a file whose meshes are files that end in {', '.join(MESHES)}"
+    demand(place.resolve().suffix.lower() in MESHES, field, must, name)
+    return file_content(place, field, must="a file whose meshes can be read")
 
 
 def _places(name: str, file: Path, packages: Mapping[str, Path], field: str) -> Iterator[Path]:
@@ -161,8 +156,8 @@ def _places(name: str, file: Path, packages: Mapping[str, Path], field: str) -> 
     path = name.removeprefix(PACKAGE)
     if Path(path).suffix.lower() in MESHES:
         path = path.lstrip("/")  # a common slip
-    if path.startswith("/") or ".." in Path(path).parts:
-        raise SettingError(field, "a file whose meshes lie in their packages", name)
+    lies_inside = not path.startswith("/") and ".." not in Path(path).parts
+    demand(lies_inside, field, "a file whose meshes lie in their packages", name)
     package, _, rest = path.partition("/")
     if package in packages:
         yield packages[package] / rest

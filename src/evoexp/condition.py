@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 import numpy as np
 
 from evoexp.attachments import FILE, SHA256, attached, keep, read
-from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting, brief
+from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting, brief, demand
 from evoexp.registry import component_class, components_in
 from evoexp.validation import LARGEST, MOST_QUERIES, TARGET, Component, build
 
@@ -80,16 +80,14 @@ def _with_contents(value: Any, folders: Sequence[Path], field: str) -> Any:
 def stored_config(text: bytes) -> dict[str, Any]:
     """Return the plain data of the canonical form that a run or a log stores, of any revision."""
     try:
-        config = json.loads(text)
+        config: dict[str, Any] = json.loads(text)
     except (ValueError, RecursionError):
         raise SettingError("config.json", "a condition in JSON", text[:40]) from None
-    if not isinstance(config, dict):
-        raise SettingError("config.json", "a condition in JSON", config)
+    demand(isinstance(config, dict), "config.json", "a condition in JSON", config)
     for part in PARTS:
-        named = config.get(part)
-        if not isinstance(named, dict) or not isinstance(named.get(TARGET), str):
-            must = f"a component, given by its {TARGET}"
-            raise SettingError(f"config.json: {part}", must, named)
+        named, must = config.get(part), f"a component, given by its {TARGET}"
+        is_named = isinstance(named, dict) and isinstance(named.get(TARGET), str)
+        demand(is_named, f"config.json: {part}", must, named)
     if unknown := set(config) - {*KEYS}:
         raise UnknownSetting(min(unknown), KEYS)
     return config
@@ -119,16 +117,13 @@ class Condition(NamedTuple):
             raise UnknownSetting(min(unknown), KEYS)
         parts = [build(config.get(part), component_class, part, _LARGEST[part]) for part in PARTS]
         for part, value in zip(PARTS, parts, strict=True):
-            if not isinstance(value, Component):
-                raise SettingError(part, f"a component, given by its {TARGET}", config.get(part))
-        seed = config.get("seed")
-        if type(seed) is not int or seed < 0:
-            raise SettingError("seed", "a whole number, at least 0", seed)
-        if seed >= MAX_SEED:
-            raise SettingError("seed", "less than 2^128", seed)
-        most = config.get(MOST_QUERIES)
-        if most is not None and (type(most) is not int or not 0 < most <= LARGEST_CAP):
-            raise SettingError(MOST_QUERIES, f"a whole number, 1 to {LARGEST_CAP:,}", most)
+            must = f"a component, given by its {TARGET}"
+            demand(isinstance(value, Component), part, must, config.get(part))
+        seed, most = config.get("seed"), config.get(MOST_QUERIES)
+        demand(type(seed) is int and seed >= 0, "seed", "a whole number, at least 0", seed)
+        demand(seed < MAX_SEED, "seed", "less than 2^128", seed)
+        is_cap = most is None or (type(most) is int and 0 < most <= LARGEST_CAP)
+        demand(is_cap, MOST_QUERIES, f"a whole number, 1 to {LARGEST_CAP:,}", most)
         robot, scenario, planner = parts
         _check_roles(robot, scenario, planner)
         return cls(robot, scenario, planner, seed, most)
@@ -227,13 +222,12 @@ def _check_roles(robot: Component, scenario: Component, planner: Component) -> N
 
     *_, inner = planners = list(_nested(planner))
     for each in planners:
-        if not isinstance(each, Component) or not hasattr(each, "prepare"):
-            raise SettingError("planner", "a planner", getattr(each, "component", each))
+        is_planner = isinstance(each, Component) and hasattr(each, "prepare")
+        demand(is_planner, "planner", "a planner", getattr(each, "component", each))
         kind = type(each)
         lacking = [m for m in MEMBERS if m not in kind.model_fields and not hasattr(kind, m)]
-        if lacking:
-            must = f"a planner; {kind.__module__}.{kind.__qualname__} lacks {', '.join(lacking)}"
-            raise SettingError("planner", must, each.component)
+        must = f"a planner; {kind.__module__}.{kind.__qualname__} lacks {', '.join(lacking)}"
+        demand(not lacking, "planner", must, each.component)
     with contextlib.suppress(NameError):  # of a type that is not imported when the planner runs
         hints = get_type_hints(inner.prepare)
         for part, value in (("robot", robot), ("scenario", scenario)):

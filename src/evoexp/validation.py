@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from evoexp.errors import SettingError, UnknownSetting, nearest
+from evoexp.errors import SettingError, UnknownSetting, demand, nearest
 
 # Counts beyond a thousand million are slips, and overflow where kernels multiply them.
 MAX_COUNT = 10**9
@@ -62,8 +62,7 @@ class Settings(BaseModel):
         Raises:
             SettingError: If it does not.
         """
-        if not holds:
-            raise SettingError(field, must, getattr(self, field))
+        demand(holds, field, must, getattr(self, field))
 
     def canonical(self) -> dict[str, Any]:
         """Return the settings as plain data: the form that is hashed, stored and built from again.

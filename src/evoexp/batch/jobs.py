@@ -253,9 +253,9 @@ class CurveFile:
         steps = min(NUM_POINTS - 1, last)
         thinned = [self._costs[k * last // steps] for k in range(steps)] + self._costs[-1:]
         with contextlib.suppress(OSError):  # nobody looks any more, or the disk is full
-            unfinished = self._folder / f"{os.getpid()}.unfinished"
-            unfinished.write_text(json.dumps(Curve(*self._of, last, thinned)))
-            unfinished.replace(self._folder / f"{os.getpid()}.json")
+            # read while it is written, it is left out of one frame
+            curve = Curve(*self._of, last, thinned)
+            (self._folder / f"{os.getpid()}.json").write_text(json.dumps(curve))
 
 
 def read_curves(folder: Path) -> list[Curve]:

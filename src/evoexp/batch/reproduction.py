@@ -55,7 +55,6 @@ class FieldDifference(NamedTuple):
         return self.size <= TOLERANCE or self.name in _UNDECIDED
 
     def __str__(self) -> str:
-        """Return the difference in words."""
         if math.isfinite(self.size):
             return f"{self.name} differs by {self.size:.1e}"
         if not all(isinstance(value, _PLAIN) for value in (self.was, self.now)):

@@ -63,7 +63,6 @@ class Batch:
             for key, run in self.runs.items()
         )
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
-        self._summarised: set[str] = set()  # conditions whose table is written
 
     def prepare(self) -> None:
         """Check conditions with missing replicates, see `refuse_large`; nothing is written yet."""
@@ -101,9 +100,9 @@ class Batch:
                 raise
             except BaseException:
                 with contextlib.suppress(OSError):
-                    self._summarise(self.runs.keys() - self._summarised)
+                    self._summarise(self.runs)
                 raise
-            self._summarise(self.runs.keys() - self._summarised)
+            self._summarise(self.runs)
 
     def _workers(self) -> contextlib.AbstractContextManager[Workers | None]:
         """Return worker processes; None where there is one, or where a cluster starts them."""
@@ -169,7 +168,6 @@ class Batch:
     def _summarise(self, keys: Iterable[str]) -> None:
         for key in keys:
             write_summary(self.runs[key], self._finished.pop(key, {}))
-            self._summarised.add(key)
 
 
 def manifest_of(run: RunDirectory, config_json: bytes) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from evoexp.condition import Condition
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 from evoexp.input_files import MEGABYTE
 from evoexp.store.log import MAX_LOG
 from evoexp.validation import Positive, Settings
@@ -69,12 +69,9 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates take more than is allowed [B], or too long a log."""
     planner, _ = condition.prepare()
     num_records = planner.num_generations + 1
-    if num_records * LEAST_RECORD > MAX_LOG:
-        most = MAX_LOG // LEAST_RECORD
-        must = f"one of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
-        raise SettingError("planner", must, num_records)
-    needed = replicate_memory(condition)
-    if needed > allowed:
-        whose = f"condition {label or condition.id[:12]}"
-        must = f"at least {needed / GIGABYTE:,.2f}, the estimate of a replicate of {whose}"
-        raise SettingError("runner.memory_gb", must, float(f"{allowed / GIGABYTE:.3g}"))
+    most = MAX_LOG // LEAST_RECORD
+    must = f"one of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
+    demand(num_records <= most, "planner", must, num_records)
+    needed, whose = replicate_memory(condition), f"condition {label or condition.id[:12]}"
+    must = f"at least {needed / GIGABYTE:,.2f}, the estimate of a replicate of {whose}"
+    demand(needed <= allowed, "runner.memory_gb", must, float(f"{allowed / GIGABYTE:.3g}"))

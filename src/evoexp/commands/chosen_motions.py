@@ -19,7 +19,7 @@ from evoexp.commands.command_parser import is_motion, is_override
 from evoexp.commands.console import new_table, plain_console, print_json, right, say
 from evoexp.commands.motion_files import FittingMotion, fitting_motions, nested, stored_motion
 from evoexp.commands.stored_runs import finished_replicate, stored_run
-from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
+from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, demand, printable
 from evoexp.planners.answers import Listing, judge_motion
 from evoexp.playback.player_page import page
 from evoexp.playback.recording import Heading, Recording, record, record_motion
@@ -82,18 +82,20 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
 
 def single(arguments: argparse.Namespace) -> Recording:
     """Return the single motion that the arguments choose."""
-    found = recordings(arguments)
-    if len(found) != 1:
-        raise MotionFileError(f"motion: one at a time, got {len(found)}; choose with --only LABEL")
-    return found[0]
+    motions = recordings(arguments)
+    if len(motions) != 1:
+        raise MotionFileError(
+            f"motion: one at a time, got {len(motions)}; choose with --only LABEL"
+        )
+    return motions[0]
 
 
 def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
     """Return the joints' limits."""
     for name in ("turn_speed", "slide_speed"):
         value = getattr(arguments, name)
-        if value is not None and not 0.0 < value < math.inf:
-            raise SettingError(f"--{name.replace('_', '-')}", "greater than 0", value)
+        is_speed = value is None or 0.0 < value < math.inf
+        demand(is_speed, f"--{name.replace('_', '-')}", "greater than 0", value)
     return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
 
 
@@ -161,21 +163,20 @@ def export(arguments: argparse.Namespace) -> int:
     """Write a motion as a joint trajectory, for a robot or MoveIt."""
     from evoexp.playback import trajectory  # and scipy
 
-    if not 0.0 < arguments.ramp < math.inf:
-        raise SettingError("--ramp", "greater than 0", arguments.ramp)
-    found = single(arguments)
-    prismatic = np.array([joint.prismatic for joint in found.joints])
-    speeds = speed_limits(arguments).of(prismatic, found.size)
-    names = tuple(joint.name for joint in found.joints)
+    demand(0.0 < arguments.ramp < math.inf, "--ramp", "greater than 0", arguments.ramp)
+    motion = single(arguments)
+    prismatic = np.array([joint.prismatic for joint in motion.joints])
+    speeds = speed_limits(arguments).of(prismatic, motion.size)
+    names = tuple(joint.name for joint in motion.joints)
     limits = trajectory.joint_limits(
-        names, arguments.limits, speeds, found.velocity_limits, arguments.ramp
+        names, arguments.limits, speeds, motion.velocity_limits, arguments.ramp
     )
-    timed = trajectory.trajectory(found, arguments.timing, limits)
-    write_json = functools.partial(trajectory.as_json, found)
+    timed = trajectory.trajectory(motion, arguments.timing, limits)
+    write_json = functools.partial(trajectory.as_json, motion)
     writers: Any = {"ros": trajectory.as_ros, "csv": trajectory.as_csv, "json": write_json}
     content = writers[arguments.format](timed)
     ending = ".csv" if arguments.format == "csv" else ".json"
-    write(output_path(arguments, [found], ending), content)
+    write(output_path(arguments, [motion], ending), content)
     # how long the motion takes, how near it comes to the limits, and what is proven of it
     speed, acceleration = (
         float((rate / limit).max()) for rate, limit in zip(timed.rates(), limits, strict=True)

@@ -1,11 +1,10 @@
 """The process of a command: its streams, temporary files, lack of memory, and interruptions.
 
-Whatever library makes a temporary file makes it in the folder. The command holds a lock there,
-which the system releases when the process ends, however it ends: a folder of this user whose lock
-is free was left by a command that was killed, and is removed. Nothing else is ever removed.
+Whatever library makes a temporary file, in this process or a worker, makes it in the command's
+folder, which is removed at the end.
 
-Where addresses are limited (`ulimit -v`), a library that cannot be loaded is an `ImportError`, a
-thread that cannot be started a `RuntimeError`, and some libraries end the process by themselves.
+Where few addresses are allowed (`ulimit -v`), some libraries end the process by themselves, and the
+compiler never comes back: such a command is refused at once.
 
 Ctrl-C, SIGTERM and a terminal that closes each end a command in the same orderly way. The first
 signal raises `Interrupted`, by which everything is closed that a command has open. While that
@@ -20,7 +19,6 @@ lost: finished files are complete at any moment.
 import atexit
 import contextlib
 import errno
-import fcntl
 import os
 import shutil
 import signal
@@ -40,11 +38,8 @@ from evoexp.errors import Notice, printable
 from evoexp.numeric.cache_folder import remove_at_exit
 
 OUTPUT = "standard output"  # the file name of its errors
-PREFIX = "evoexp-command-"
-LOCK = "owner.lock"
 MEGABYTE = 10**6
 LEAST_MB = 2_500  # [MB] of addresses; a shipped run that compiles its kernels took 2,219
-_TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new thread", "bad_alloc")
 PATIENCE_S = 3.0  # [s] that closing may take before what it waits for is interrupted, too
 CLOSING_S = 15.0  # [s] that closing may take at all
 ENDING_S = 3.0  # [s] that the interpreter may take to end: an interrupted thread may never do
@@ -58,27 +53,9 @@ def use_temporary_folder() -> None:
     Without one, where none can be made, they are where they would be anyhow.
     """
     with contextlib.suppress(OSError):
-        place = Path(tempfile.gettempdir())
-        remove_abandoned(place)
-        folder = place / f"{PREFIX}{os.urandom(8).hex()}"
-        folder.mkdir(mode=0o700)
-        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)  # held until the process ends
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if (folder / LOCK).exists():  # else another command has just removed it
-            remove_at_exit(folder)
-            os.environ["TMPDIR"] = tempfile.tempdir = str(folder)
-
-
-def remove_abandoned(place: Path) -> None:
-    """Remove the folders of commands that have ended without removing them."""
-    for folder in place.glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
-            if folder.lstat().st_uid == os.geteuid() and not folder.is_symlink():
-                # one without a lock may just begin
-                lock = os.open(folder / LOCK, os.O_RDWR | os.O_NOFOLLOW)
-                stack.callback(os.close, lock)
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails while its owner lives
-                shutil.rmtree(folder, ignore_errors=True)
+        folder = tempfile.mkdtemp(prefix="evoexp-command-")
+        remove_at_exit(Path(folder))
+        os.environ["TMPDIR"] = tempfile.tempdir = folder
 
 
 def refuse_too_little_memory() -> None:
@@ -90,23 +67,11 @@ def refuse_too_little_memory() -> None:
 
 def memory_shortage(error: BaseException) -> str:
     """Describe the lack of memory that an error means; empty if it means something else."""
-    chain: list[BaseException] = []
-    cause: BaseException | None = error
-    while cause is not None and cause not in chain:
-        chain.append(cause)
-        cause = cause.__cause__ or cause.__context__
-    texts = []
-    for each in chain:
-        lines = [line.strip() for line in str(each).splitlines() if line.strip()]
-        named = [line for line in lines if any(text in line.lower() for text in _TEXTS)]
-        is_named = isinstance(each, OSError) and each.errno == errno.ENOMEM
-        if named or is_named or isinstance(each, MemoryError):
-            texts.append((named or lines or ["the system gives no more"])[0])
-    if not texts:
+    if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
         return ""
-    allowed = allowed_addresses()
+    lines, allowed = str(error).strip().splitlines(), allowed_addresses()
     limit = f" (`ulimit -v` allows {allowed // MEGABYTE:,} MB)" if allowed is not None else ""
-    return f"out of memory: {texts[-1]}{limit}"
+    return f"out of memory: {lines[0] if lines else 'the system gives no more'}{limit}"
 
 
 def open_streams() -> None:

@@ -9,7 +9,7 @@ import shtab
 
 from evoexp.commands.command_parser import whole_parser
 from evoexp.configuration.search_path import groups, options
-from evoexp.errors import SettingError
+from evoexp.errors import demand
 
 SHELLS = ("bash", "zsh")
 SINGLE = ("num_replicates", "seed")  # settings of no group
@@ -21,8 +21,7 @@ def main(arguments: argparse.Namespace) -> int:
         for name in options(arguments.group) if arguments.group in groups() else ():
             print(name)
         return 0
-    if arguments.group is not None:
-        raise SettingError("completion", f"{arguments.shell} alone", arguments.group)
+    demand(arguments.group is None, "completion", f"{arguments.shell} alone", arguments.group)
     print(script(arguments.shell))
     return 0
 

@@ -66,8 +66,8 @@ def _side(prefix: str) -> Side:
             if len(runs) > 1:
                 choices = ", ".join(f"{prefix}:{run.hash12}" for run in runs[: stored_runs.NAMED])
                 raise UnknownHash(f"{prefix}: holds {len(runs)} runs; choose one: {choices}")
-            found = _stored(runs[0])
-            return found._replace(head=f"{printable(packed[0].name)}\n{found.head}")
+            side = _stored(runs[0])
+            return side._replace(head=f"{printable(packed[0].name)}\n{side.head}")
     run = stored_runs.stored_or_shipped(prefix)
     if isinstance(run, RunDirectory):
         return _stored(run)
@@ -89,13 +89,11 @@ def _measured(row: Mapping[str, Any]) -> str:
 def _environment(one: Side, two: Side) -> list[tuple[str, Any, Any]]:
     if one.manifest is None or two.manifest is None:
         return []
-    found = [
-        (str(each.name), each.was, each.now)
-        for each in differences(one.manifest, two.manifest)
-        if each.name.split(".")[0] not in ORIGIN
-    ]
     code = [{"git": manifest.get("git")} for manifest in (one.manifest, two.manifest)]
-    return [*found, *changed(*code)]
+    return [
+        *(d for d in differences(one.manifest, two.manifest) if d.name.split(".")[0] not in ORIGIN),
+        *changed(*code),
+    ]
 
 
 def _results(rows: Collection[Mapping[str, Any]], terms: Sequence[str]) -> dict[str, Any]:

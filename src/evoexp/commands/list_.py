@@ -70,16 +70,13 @@ def _print(arguments: argparse.Namespace, place: str, stored: Iterable[NamedRun]
 def _failures(stored: Iterable[NamedRun]) -> list[dict[str, Any]]:
     rows = []
     for name, run in stored:
-        if isinstance(run, EvoexpError) or not run.failed():
-            continue
-        label = run.origin()["label"] or ""
-        for replicate in sorted(run.failed()):
-            try:
-                reason = str(run.failure(replicate)["reason"])
-            except EvoexpError as error:
-                reason = str(error)
-            row = (name, label, replicate, reason, str(run.failure_path(replicate)))
-            rows.append(dict(zip(FAILED_KEYS, row, strict=True)))
+        if isinstance(run, RunDirectory) and run.failed():
+            label = run.origin()["label"] or ""
+            for row in summary_table(run).to_pylist():
+                if row["status"] == "failed":
+                    path = str(run.failure_path(row["replicate"]))
+                    values = (name, label, row["replicate"], row["stop_reason"], path)
+                    rows.append(dict(zip(FAILED_KEYS, values, strict=True)))
     return rows
 
 

@@ -1,6 +1,7 @@
 """`evoexp new`: the first files of a package with a user's own planner, operator or paper."""
 
 import argparse
+import itertools
 import keyword
 import re
 import shutil
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import evoexp
 from evoexp.configuration.search_path import options
-from evoexp.errors import EvoexpError, SettingError
+from evoexp.errors import EvoexpError, demand
 from evoexp.registry import COMPONENTS, names
 from evoexp.store.files import write_files
 
@@ -33,12 +34,11 @@ def main(arguments: argparse.Namespace) -> int:
     """Write the package and print the commands to type next."""
     name = arguments.name
     root = arguments.directory / name
-    if not re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
-        must = "a word of lower-case letters, digits and _ that begins with a letter"
-        raise SettingError("NAME", must, name)
-    known = {*names(COMPONENTS), *(option for group in GROUPS for option in options(group))}
-    if name in known or name == "evoexp":
-        raise SettingError("NAME", "a new name: a component or option has it already", name)
+    is_name = re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) and not keyword.iskeyword(name)
+    must = "a word of lower-case letters, digits and _ that begins with a letter"
+    demand(is_name, "NAME", must, name)
+    known = {"evoexp", *names(COMPONENTS), *itertools.chain(*map(options, GROUPS))}
+    demand(name not in known, "NAME", "a new name: a component or option has it already", name)
     if root.exists():
         raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
     if find_spec(name) is not None:

@@ -4,7 +4,7 @@ Nothing is run or written.
 """
 
 import argparse
-import hashlib
+import contextlib
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -20,9 +20,9 @@ from evoexp.commands.console import hash_column, new_table, print_json, right, s
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import StoreError
-from evoexp.store.identity import CONFIG, leaves, read
+from evoexp.store.identity import CONFIG, config_id, leaves, read_object
 from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
-from evoexp.store.summaries import damaged_logs, summary_table
+from evoexp.store.summaries import damaged_logs, replicate_of, summary_table
 from evoexp.validation import TARGET
 
 START_S = 5.0  # [s] assumed: at most, to start workers and compile nothing
@@ -70,7 +70,7 @@ def main(arguments: argparse.Namespace) -> int:
             settings = json.loads(condition.to_json())
             count, done = condition.num_replicates(experiment.num_replicates), run.completed()
             asked = set(range(count))
-            damaged = {int(Path(name).stem) for name in damaged_logs(run)} if done else set()
+            damaged = set(map(replicate_of, damaged_logs(run))) & done if done else set()
             cached, failed = (done - damaged) & asked, run.failed() & asked
             same_settings = stored.named.get(_without_revisions(settings), ())
             rows[condition.id] = PlannedCondition(
@@ -150,23 +150,18 @@ class StoredTimes:
         self._alike: dict[str, list[RunDirectory]] = {}  # planner and scene → runs
         self._times: dict[str, Times] = {}  # of a run
         for name in run_names(outputs):
-            try:
-                content = read(outputs / "runs" / name / CONFIG)
-                settings = json.loads(content)
-            except (StoreError, ValueError):
-                continue
-            condition_id = hashlib.sha256(content).hexdigest()
-            if condition_id.startswith(name) and isinstance(settings, dict):
-                self.named.setdefault(_without_revisions(settings), []).append(condition_id)
-                run = RunDirectory(outputs, condition_id)
+            with contextlib.suppress(StoreError):
+                path = outputs / "runs" / name
+                run, settings = RunDirectory(outputs, config_id(path)), read_object(path / CONFIG)
+                self.named.setdefault(_without_revisions(settings), []).append(run.condition_id)
                 self._alike.setdefault(_scene(settings), []).append(run)
 
     def estimate(self, condition: Condition, run: RunDirectory, settings: Any) -> Estimate:
         """Estimate the CPU time of a replicate: from its own ones, else from runs like it."""
-        if own := [seconds for seconds, _ in self._times_of(run)]:
-            widening = 1.0 if len(own) >= FEW else 2.0
-            least, most = min(own) / widening, max(own) * widening
-            return float(np.mean(own)), least, most, f"{len(own)} of its own"
+        if times := [seconds for seconds, _ in self._times_of(run)]:
+            widening = 1.0 if len(times) >= FEW else 2.0
+            least, most = min(times) / widening, max(times) * widening
+            return float(np.mean(times)), least, most, f"{len(times)} of its own"
         alike = list(filter(None, map(self._times_of, self._alike.get(_scene(settings), ()))))
         if not alike:
             return None, None, None, "nothing stored like it"

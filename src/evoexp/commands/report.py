@@ -23,7 +23,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import is_file, options, searched_first
-from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError, UnknownOption
+from evoexp.errors import EvoexpError, NothingStored, StoreError, UnknownOption, demand
 from evoexp.report.pages import build
 from evoexp.report.pages.html_page import summaries, verdict_counts
 from evoexp.report.pages.page_builder import page_of
@@ -32,7 +32,7 @@ from evoexp.report.statistics.judging import Rules, registered_rules
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
-PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
+PlannedReports = dict[str, Callable[[], build.ReportFiles]]  # folder → who draws it
 CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
 MAX_NAMED = 4  # runs whose hashes a report's name spells out
 _HASH = re.compile("[0-9a-fA-F]{4,64}")
@@ -43,22 +43,21 @@ def main(arguments: argparse.Namespace) -> int:
     """Draw, or check; exit code 1 if something differs, or one of all cannot be drawn."""
     if arguments.all:
         return _main_of_all(arguments)
-    if not arguments.overrides:
-        raise SettingError("experiment", "named, or --all given", "none")
+    demand(arguments.overrides, "experiment", "named, or --all given", "none")
     arguments.overrides = unpacked(arguments.overrides)
     if CLAIMS in arguments.overrides:
         arguments.overrides = _with_claims(arguments.overrides)
-    found = requests(arguments)
+    asked = requests(arguments)
     if arguments.check:
-        return _check(request.files(outputs_root()) for request in found)
-    say_each(functools.partial(request.write, outputs_root()) for request in found)
+        return _check(request.files(outputs_root()) for request in asked)
+    say_each(functools.partial(request.write, outputs_root()) for request in asked)
     return 0
 
 
 def _main_of_all(arguments: argparse.Namespace) -> int:
-    if given := [*arguments.overrides, *arguments.only, *["-m"] * arguments.multirun]:
-        raise SettingError("--all", "given alone", " ".join(given))
-    planned = list(planned_reports(outputs_root()))
+    beside = [*arguments.overrides, *arguments.only, *["-m"] * arguments.multirun]
+    demand(not beside, "--all", "given alone", " ".join(beside))
+    planned = planned_reports(outputs_root())
     if not planned:
         raise NothingStored(
             f"report: no experiment is stored in {outputs_root()}, and no report; see: evoexp list"
@@ -128,9 +127,8 @@ def chosen(
     names = [word for word in arguments.overrides if word not in overrides]
     unknown = [name for name in names if name not in known and not is_file(name)]
     if names and len(unknown) == len(names) and all(map(_HASH.fullmatch, names)):
-        if overrides or multirun or only:
-            must = "left out where runs are given by their hashes"
-            raise SettingError("overrides", must, " ".join([*overrides, *only]) or "-m")
+        must, beside = "left out where runs are given by their hashes", [*overrides, *only]
+        demand(not (beside or multirun), "overrides", must, " ".join(beside) or "-m")
         runs = [resolve(outputs_root(), name) for name in names]
         conditions = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
         plain = compose.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
@@ -196,9 +194,9 @@ def request_of(
 # all reports
 
 
-def _drawn(planned: Sequence[PlannedReport], failed: list[str]) -> Iterator[build.ReportFiles]:
+def _drawn(planned: PlannedReports, failed: list[str]) -> Iterator[build.ReportFiles]:
     """Draw reports one after the other; name those that cannot be drawn, and leave them."""
-    for folder, draw in planned:
+    for folder, draw in planned.items():
         try:
             report = draw()
             if report.directory.name != folder:
@@ -210,8 +208,8 @@ def _drawn(planned: Sequence[PlannedReport], failed: list[str]) -> Iterator[buil
         yield report
 
 
-def planned_reports(outputs: Path) -> Iterator[PlannedReport]:
-    """Yield the reports of experiments that stored runs name, then the others that are there."""
+def planned_reports(outputs: Path) -> PlannedReports:
+    """Return the reports of experiments that stored runs name, then the others that are there."""
     named = dict[tuple[str, str], set[str]]()  # (experiment, budget) → hashes of its runs
     for _, run in stored_runs(outputs):
         if isinstance(run, RunDirectory) and (run.completed() or run.failed()):
@@ -219,17 +217,17 @@ def planned_reports(outputs: Path) -> Iterator[PlannedReport]:
                 notes = run.manifest()
                 origin = str(notes.get("experiment")), str(notes.get("budget"))
                 named.setdefault(origin, set()).add(run.condition_id)
-    known, seen = itertools.product(options("experiment"), options("budget")), set[str]()
+    planned: PlannedReports = {}
+    known = itertools.product(options("experiment"), options("budget"))
     for name, budget in (origin for origin in known if origin in named):
         (experiment,) = compose.expand(words := [f"experiment={name}", f"budget={budget}"])
         if named[name, budget].isdisjoint(condition.id for _, condition in experiment.conditions):
             continue  # all of them were run with other settings
         request = request_of(experiment, words)
-        seen.add(request.report_name)
-        yield request.report_name, functools.partial(request.files, outputs)
-    for each in summaries(outputs / "reports"):
-        if each.folder not in seen:
-            yield each.folder, functools.partial(_again, each.folder, each.command)
+        planned[request.report_name] = functools.partial(request.files, outputs)
+    for page in summaries(outputs / "reports"):
+        planned.setdefault(page.folder, functools.partial(_again, page.folder, page.command))
+    return planned
 
 
 def _again(folder: str, command: str) -> build.ReportFiles:
@@ -252,10 +250,10 @@ def _again(folder: str, command: str) -> build.ReportFiles:
     with searched_first(arguments.config_dir):
         if name == "compare":
             return compare.drawn(arguments)[0]
-        found = [] if arguments.all else requests(arguments)
-        if len(found) != 1:
+        asked = [] if arguments.all else requests(arguments)
+        if len(asked) != 1:
             raise no_command
-        return found[0].files(outputs_root())
+        return asked[0].files(outputs_root())
 
 
 _OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "size", "n", "verdict")
@@ -271,11 +269,11 @@ def claims(arguments: argparse.Namespace) -> int:
         if (registration := registry.registered(registry.CLAIMS, paper)) is None:
             raise UnknownOption("paper", paper, registry.names(registry.CLAIMS))
         papers[paper] = registered_rules(registration)
-    found = [row for paper, rules in papers.items() for row in claims_of(paper, rules)]
+    judged = [row for paper, rules in papers.items() for row in claims_of(paper, rules)]
     if arguments.json:
-        print_json(found)
+        print_json(judged)
         return 0
-    for row in found:  # what is claimed, by which rule, from which numbers
+    for row in judged:  # what is claimed, by which rule, from which numbers
         title = f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}"
         table = new_table(title, Column(no_wrap=True), "")
         table.show_header = False
@@ -284,8 +282,8 @@ def claims(arguments: argparse.Namespace) -> int:
             table.add_row(name, row[key] or "–")
         say(table)
         say("")
-    ours = [row for row in found if row["source"].startswith(OURS)]
-    for name, rows in (("claims", [r for r in found if r not in ours]), ("our questions", ours)):
+    ours = [row for row in judged if row["source"].startswith(OURS)]
+    for name, rows in (("claims", [r for r in judged if r not in ours]), ("our questions", ours)):
         counts = verdict_counts(row["verdict"] for row in rows)
         words = ", ".join(f"{count} {verdict}" for verdict, count in counts)
         if rows:

@@ -1,8 +1,7 @@
 """`evoexp reproduce`: run replicates again and say MATCH, or the first generation that differs."""
 
 import argparse
-import contextlib
-from collections import deque
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -54,16 +53,12 @@ def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison]:
 
 
 def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison]:
-    waiting = deque((run.log_path(k), run.condition_id, k) for k in replicates)
-    compared: list[Comparison] = []
-    with contextlib.ExitStack() as stack:
-        workers = stack.enter_context(Workers(num_cores())) if len(waiting) > FEW else None
-        # the first one compiles, before any worker does
-        while waiting and not any(not each.damage for each in compared):
-            compared.append(reproduce_stored(*waiting.popleft()))
-        if workers is None:
-            return compared + [reproduce_stored(*each) for each in waiting]
-        return [*compared, *in_order(workers, reproduce_stored, waiting)]
+    tasks = [(run.log_path(k), run.condition_id, k) for k in replicates]
+    if len(tasks) <= FEW:
+        return list(itertools.starmap(reproduce_stored, tasks))
+    with Workers(num_cores()) as workers:
+        first = reproduce_stored(*tasks[0])  # it compiles, before any worker does
+        return [first, *in_order(workers, reproduce_stored, tasks[1:])]
 
 
 def _report(rows: Sequence[Comparison]) -> int:

@@ -26,7 +26,7 @@ from evoexp.configuration import compose
 from evoexp.configuration.experiment import Built, Experiment, Labelled
 from evoexp.configuration.overrides import SWEEP
 from evoexp.configuration.search_path import folders, options
-from evoexp.errors import SettingError, printable
+from evoexp.errors import SettingError, demand, printable
 from evoexp.numeric.cache_folder import cache_root
 from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.report_settings import page_registration
@@ -53,8 +53,8 @@ def main(arguments: argparse.Namespace) -> int:
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
     runner = experiments[0].runner
-    if arguments.live and runner.backend != "loky":
-        raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
+    is_local = runner.backend == "loky" or not arguments.live
+    demand(is_local, "--live", "a run on this machine: runner.backend=loky", runner.backend)
     with contextlib.ExitStack() as stack:
         curves = None
         if arguments.live:
@@ -140,10 +140,9 @@ def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> 
     search = experiment.search
     if search is None:
         return
-    given = {word: compose.parse(word) for word in overrides}
-    kept = {w: each for w, each in given.items() if each.key not in search.space}
-    fixed = [word for word, each in kept.items() if each.root != SWEEP]
-    fixed += ["-m"] * any(each.is_swept for each in kept.values())
+    kept = [each for each in map(compose.parse, overrides) if each.key not in search.space]
+    fixed = [override.text for override in kept if override.root != SWEEP]
+    fixed += ["-m"] * any(override.is_swept for override in kept)
 
     def typed(trial: "Trial") -> list[str]:
         settings = trial.settings.items()

@@ -4,6 +4,7 @@ The facts about each are one mapping with the keys of `KEYS`, which `--json` pri
 """
 
 import argparse
+import contextlib
 import functools
 import hashlib
 import itertools
@@ -30,6 +31,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError, SettingError, printable
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, components_in, lacking, registered
+from evoexp.store.files import first_of
 from evoexp.store.identity import ORIGIN, TAKEN, differences, environment, leaves, typed_parts
 from evoexp.store.log_reader import LogContents, read_log
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -57,54 +59,52 @@ def main(arguments: argparse.Namespace) -> int:
     """Print a screen of facts; of several conditions a table."""
     words: list[str] = arguments.overrides
     as_table = not (arguments.all or arguments.json)
-    if any(map(is_override, words)):
-        experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
-        arguments.only = ()  # each command has its own
-        command = ["evoexp", "run", *words, *option_words(arguments)]
-        labelled = [(each, label) for each in experiments for label, _ in each.conditions]
-        if as_table and len(labelled) > 1:
-            for experiment in experiments:
-                say(_condition_table(experiment))
-            say("one condition on a screen: --only LABEL")
-        else:
-            found = [
+    runs: list[RunDirectory] = []
+    with contextlib.ExitStack() as archive:
+        if any(map(is_override, words)):
+            experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
+            arguments.only = ()  # each command has its own
+            command = ["evoexp", "run", *words, *option_words(arguments)]
+            if as_table and sum(len(experiment.conditions) for experiment in experiments) > 1:
+                for experiment in experiments:
+                    say(_condition_table(experiment))
+                say("one condition on a screen: --only LABEL")
+                return 0
+            facts = [
                 composed_facts(experiment, label, shlex.join([*command, "--only", label]))
-                for experiment, label in labelled
+                for experiment in experiments
+                for label, _ in experiment.conditions
             ]
-            _print_screens(arguments, found)
-    elif packed := stored_runs.in_archive(" ".join(words)):
-        path, prefix = packed
-        with stored_runs.looked_into(path, prefix) as runs:
+        elif packed := stored_runs.in_archive(" ".join(words)):
+            path, runs = str(packed[0]), archive.enter_context(stored_runs.looked_into(*packed))
             if as_table and len(runs) > 1:
                 say(run_table("", [run_row(run.hash12, run) for run in runs]))
-                say(f"one run on a screen: evoexp show {printable(str(path))}:{runs[0].hash12}")
-            else:
-                found = [stored_facts(run, str(path)) for run in runs]
-                _print_screens(arguments, found, runs)
-    elif len(words) > 1:
-        raise SettingError("show", "given one hash or log", " ".join(words))
-    elif (path := Path(words[0])).suffix == ".mcap" or path.is_file():
-        _print_screens(arguments, [log_facts(path)])
-    else:
-        run = stored_runs.stored_or_shipped(words[0])
-        if isinstance(run, RunDirectory):
-            _print_screens(arguments, [stored_facts(run, str(run.path))], [run])
+                say(f"one run on a screen: evoexp show {printable(path)}:{runs[0].hash12}")
+                return 0
+            facts = [stored_facts(run, path) for run in runs]
+        elif len(words) > 1:
+            raise SettingError("show", "given one hash or log", " ".join(words))
+        elif (log := Path(words[0])).suffix == ".mcap" or log.is_file():
+            facts = [log_facts(log)]
+        elif isinstance(named := stored_runs.stored_or_shipped(words[0]), RunDirectory):
+            facts, runs = [stored_facts(named, str(named.path))], [named]
         else:
-            facts = composed_facts(stored_runs.shipped_experiment(run), run.label, run.command)
-            _print_screens(arguments, [facts])
+            experiment = stored_runs.shipped_experiment(named)
+            facts = [composed_facts(experiment, named.label, named.command)]
+        _print_screens(arguments, facts, runs)
     return 0
 
 
 def _print_screens(
-    arguments: argparse.Namespace, found: Sequence[Any], runs: Sequence[RunDirectory] = ()
+    arguments: argparse.Namespace, screens: Sequence[Any], runs: Sequence[RunDirectory]
 ) -> None:
     if arguments.json:
-        print_json(found if len(found) > 1 else found[0])
+        print_json(screens if len(screens) > 1 else screens[0])
         return
     as_yaml = functools.partial(
         yaml.safe_dump, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
     )
-    for facts, run in itertools.zip_longest(found, runs):
+    for facts, run in itertools.zip_longest(screens, runs):
         for line in screen(facts, plain_console().width):
             say(line)
         if arguments.all:
@@ -134,12 +134,11 @@ def _condition_table(experiment: Experiment) -> Table:
     last = "settings in which they differ"
     table = new_table(experiment.report_name, "condition", *heads, last)
     for (label, condition), values in zip(experiment.conditions, settings, strict=True):
-        given = [f"{name}={compact(values[name])}" for name in differing if name in values]
-        more = [f"… {len(given) - MAX_CHANGES} more"] if len(given) > MAX_CHANGES else []
+        changes = [f"{name}={compact(values[name])}" for name in differing if name in values]
         run = RunDirectory(outputs_root(), condition.id)
         planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
         done = f"{len(run.completed())} of {planned}" if run.completed() or run.failed() else "–"
-        table.add_row(label, run.hash12, done, "\n".join([*given[:MAX_CHANGES], *more]))
+        table.add_row(label, run.hash12, done, "\n".join(first_of(changes, MAX_CHANGES)))
     return table
 
 
@@ -335,8 +334,7 @@ def _component(component: Mapping[str, Any]) -> str:
 def _said(fact: Any) -> str:
     """Say a fact: plain values of a mapping in one line, then a line for each list and mapping."""
     if isinstance(fact, list):
-        more = f" and {len(fact) - MAX_ENTRIES} more" if len(fact) > MAX_ENTRIES else ""
-        return "; ".join(map(_said, fact[:MAX_ENTRIES])) + more
+        return "; ".join(first_of(list(map(_said, fact)), MAX_ENTRIES))
     if not isinstance(fact, Mapping):
         return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
     told = {k.replace("_", " "): v for k, v in fact.items() if v or v == 0}

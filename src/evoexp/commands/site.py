@@ -15,7 +15,7 @@ from evoexp.report.pages.html_page import HTML, Paper, StoredRun, home_page, sum
 from evoexp.report.results.parameters import option
 from evoexp.report.statistics.judging import registered_rules
 from evoexp.shipped import config_directory, shipped
-from evoexp.store.files import write_file
+from evoexp.store.files import first_of, write_file
 from evoexp.store.identity import ORIGIN
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
@@ -37,12 +37,9 @@ def main(arguments: argparse.Namespace) -> int:
         and run.is_being_written()
     ]
     if busy:
-        more = ", …" if len(busy) > MAX_NAMED else ""
-        which = "runs are" if len(busy) > 1 else "run is"
-        say(
-            f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
-            "their results are partial"
-        )
+        which, named = "runs are" if len(busy) > 1 else "run is", first_of(busy, MAX_NAMED)
+        names = ", ".join(named)
+        say(f"{len(busy)} {which} being written now ({names}): their results are partial")
     return 0
 
 

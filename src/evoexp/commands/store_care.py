@@ -16,7 +16,7 @@ from evoexp.commands.console import hash_column, new_table, plain_console, print
 from evoexp.commands.stored_runs import in_archive, looked_into, stored_run
 from evoexp.condition import revisions
 from evoexp.errors import Busy, StoreError, UnknownOption, printable
-from evoexp.store.files import is_set_aside, is_temporary
+from evoexp.store.files import first_of, is_set_aside, is_temporary
 from evoexp.store.identity import CONFIG, REPLICATES, read
 from evoexp.store.integrity import DELETE, LogCheck, RunCheck, check_log, check_run
 from evoexp.store.run_directory import COMMAND, RunDirectory, outputs_root, run_names
@@ -35,8 +35,8 @@ def verify(arguments: argparse.Namespace) -> int:
     names: list[str] = []
     for prefix in arguments.hashes:  # whatever is damaged in the run
         if prefix not in archives:
-            own = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
-            names += own if len(own) == 1 else [stored_run(prefix).hash12]
+            known = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
+            names += known if len(known) == 1 else [stored_run(prefix).hash12]
     if not arguments.hashes:
         names = run_names(outputs)
     with plain_console().status("checking logs"):
@@ -56,16 +56,13 @@ def verify(arguments: argparse.Namespace) -> int:
         table = new_table(title, hash_column("run"), *right("logs"), "damaged files")
         for run in damaged:
             lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
-            rest = [f"… {len(lines) - SHOWN} more"] if lines[SHOWN:] else []
-            table.add_row(run.hash, str(run.logs), "\n".join(lines[:SHOWN] + rest))
+            table.add_row(run.hash, str(run.logs), "\n".join(first_of(lines, SHOWN)))
         say(table)
         for mend in dict.fromkeys(run.mend for run in damaged if run.mend):
             say(f"mend: {mend}")
     for run in found:
         if run.leftovers:
-            listed = ", ".join(run.leftovers[:SHOWN])
-            more = f", … {len(run.leftovers) - SHOWN} more" if run.leftovers[SHOWN:] else ""
-            say(f"not part of run {run.hash}: {listed}{more}")
+            say(f"not part of run {run.hash}: {', '.join(first_of(run.leftovers, SHOWN))}")
         if run.unevaluated:
             say(f"run {run.hash}: its solutions were not evaluated: {run.unevaluated}")
     logs, problems = sum(r.logs for r in found), sum(len(r.problems) for r in found)
@@ -95,20 +92,20 @@ def _check(path: Path, condition_id: str) -> LogCheck:
     return check_log(path, condition_id, contradictions)
 
 
-def _checked(found: RunCheck, logs: list[LogCheck]) -> RunCheck:
+def _checked(check: RunCheck, logs: list[LogCheck]) -> RunCheck:
     """Return a run with the problems of its logs, and the command that mends it, if one does."""
-    problems = found.problems | {log.name: log.problem for log in logs if log.problem}
-    mend = ""
-    if found.run is not None:
+    run, mend = check.run, ""
+    problems = check.problems | {log.name: log.problem for log in logs if log.problem}
+    if run is not None:
         whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
-        if problem := altered(found.run, whole):
+        if problem := altered(run, whole):
             problems["summary.parquet"] = problem + DELETE
-    if problems and (found.run or CONFIG in problems):  # else nothing of it can be read
-        known = found.run.command if found.run else COMMAND
-        rows = shipped.find(found.hash) if known == COMMAND else []
-        mend = rows[0].command if rows else known
+    if problems and (run or CONFIG in problems):  # else nothing of it can be read
+        mend = run.command if run else COMMAND
+        if mend == COMMAND and (rows := shipped.find(check.hash)):
+            mend = rows[0].command
     unevaluated = next((log.unevaluated for log in logs if log.unevaluated), "")
-    return found._replace(problems=problems, logs=len(logs), mend=mend, unevaluated=unevaluated)
+    return check._replace(problems=problems, logs=len(logs), mend=mend, unevaluated=unevaluated)
 
 
 MOST_LISTED = 20
@@ -161,13 +158,12 @@ def waste(outputs: Path) -> Iterator[Waste]:
                 continue
         for folder in (path, path / REPLICATES):
             for each in sorted(folder.iterdir()) if folder.is_dir() else ():
-                kinds = {
-                    "temporary": is_temporary(each.name),
-                    "damaged": is_set_aside(each.name),
-                    "failed": each.name.endswith(".failed.json"),
-                }
-                if kind := next((kind for kind, is_own in kinds.items() if is_own), ""):
-                    yield Waste(kind, each, _size(each))
+                if is_temporary(each.name):
+                    yield Waste("temporary", each, _size(each))
+                elif is_set_aside(each.name):
+                    yield Waste("damaged", each, _size(each))
+                elif each.name.endswith(".failed.json"):
+                    yield Waste("failed", each, _size(each))
 
 
 def _size(path: Path) -> int:

@@ -18,6 +18,7 @@ from evoexp.configuration.search_path import options
 from evoexp.errors import AmbiguousHash, EvoexpError, NothingStored, UnknownHash, printable
 from evoexp.shipped import Shipped
 from evoexp.store import archive
+from evoexp.store.files import first_of
 from evoexp.store.run_directory import RunDirectory, open_run, outputs_root, resolve, run_names
 
 MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
@@ -52,9 +53,7 @@ def stored_or_shipped(prefix: str) -> RunDirectory | Shipped:
             return rows[0]
         if rows:
             raise AmbiguousHash(prefix, [row.condition_id[:12] for row in rows]) from None
-        names = run_names(outputs_root())
-        more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-        stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
+        stored = ", ".join(first_of(run_names(outputs_root()), MAX_LISTED)) or "none"
         hint = f"no shipped condition either (stored: {stored}; see: evoexp list)"
         if prefix in options("experiment"):
             hint = f"did you mean 'experiment={prefix}'?"
@@ -128,11 +127,10 @@ def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
         runs = [taken.run for taken in archive.take_in(path, Path(folder))]
         chosen = [run for run in runs if run.condition_id.startswith(prefix.lower())]
         if prefix and len(chosen) != 1:
-            held = ", ".join(run.hash12 for run in runs[:NAMED])
-            more = f", … {len(runs) - NAMED} more" if len(runs) > NAMED else ""
+            held = ", ".join(first_of([run.hash12 for run in runs], NAMED))
             raise UnknownHash(
                 f"hash: '{prefix}' must begin one run of {printable(str(path))}, begins "
-                f"{len(chosen)} (holds: {held}{more})"
+                f"{len(chosen)} (holds: {held})"
             )
         yield chosen
 
@@ -141,15 +139,15 @@ def unpacked(words: Sequence[str]) -> list[str]:
     """Take archives among words into the store; return the hashes of their runs in their place."""
     from evoexp.commands.console import say
 
-    found: list[str] = []
+    names: list[str] = []
     for word in words:
         if not is_archive(word):
-            found.append(word)
+            names.append(word)
             continue
         for taken in archive.take_in(Path(word), outputs_root()):
-            found.append(taken.run.condition_id)
+            names.append(taken.run.condition_id)
             say(
                 f"{printable(word)}: run {taken.run.hash12}: {taken.added} replicates added to "
                 f"{outputs_root()}, {taken.kept} there already"
             )
-    return found
+    return names

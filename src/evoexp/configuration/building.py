@@ -17,7 +17,7 @@ from evoexp.condition import PARTS, Condition, read_files
 from evoexp.configuration.experiment import Budget
 from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
 from evoexp.configuration.search_path import chosen, folders
-from evoexp.errors import SettingError, UnknownSetting
+from evoexp.errors import SettingError, UnknownSetting, demand
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
 from evoexp.robots.assembly import Robot
@@ -61,11 +61,10 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
     # groups that the planner takes in, whose errors name the group, as it was typed
     for group in (group for group in PLANNER_PARTS if plain.get(group) is not None):
         is_taken = f"${{{group}" in planner
-        if group in plain["planner"] and not is_taken:
+        if not is_taken and group in plain["planner"]:
             must = f"left as it is; set {group} itself"
             raise SettingError(f"planner.{group}", must, plain["planner"][group])
-        if not is_taken:
-            raise SettingError(group, "a part of the chosen planner", plain[group])
+        demand(is_taken, group, "a part of the chosen planner", plain[group])
         build(plain[group], component_class, group)
     # a control or a reference is put around the planner
     around = [group for group in AROUND if plain.get(group) is not None]
@@ -76,20 +75,18 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
         build(plain["planner"], component_class, "planner")
         if TARGET not in plain[group]:
             raise SettingError(group, chosen(group), plain[group])
-        if "planner" in plain[group]:
-            must = "left out: it is the chosen planner"
-            raise SettingError(f"{group}.planner", must, plain[group]["planner"])
+        must, own = "left out: it is the chosen planner", plain[group].get("planner")
+        demand("planner" not in plain[group], f"{group}.planner", must, own)
         plain["planner"] = {**plain[group], "planner": plain["planner"]}
         build(plain["planner"], component_class, group)  # its errors name the group, as typed
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
 
 
-def planned_replicates(count: Any, budget: Budget) -> int:
+def planned_replicates(count: int, budget: Budget) -> int:
     """Return the number of replicates, capped by the budget."""
-    if type(count) is not int or count < 1:
-        raise SettingError("num_replicates", "a whole number, at least 1", count)
-    if count > MOST_REPLICATES:
-        raise SettingError("num_replicates", f"at most {MOST_REPLICATES}", count)
+    is_count = type(count) is int and count >= 1
+    demand(is_count, "num_replicates", "a whole number, at least 1", count)
+    demand(count <= MOST_REPLICATES, "num_replicates", f"at most {MOST_REPLICATES}", count)
     return count if budget.max_replicates is None else min(count, budget.max_replicates)
 
 
@@ -163,20 +160,18 @@ def _with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(robot, dict) or robot.get(TARGET) != "urdf" or "urdf" not in robot:
         return plain
     task: MoveitTask = build(scenario, component_class, PARTS[1])
-    settings = dict(robot)
-    if group := task.plan_request.group:
-        given = robot.get("group") or ""
-        if given and given != group:
-            must = f"'{group}', the group of scenario.request (or left out)"
-            raise SettingError("robot.group", must, given)
-        if not robot.get("joints") and not robot.get("groups") and robot.get("srdf"):
-            settings["group"] = group
-    if link := task.plan_request.link:
-        given = robot.get("tool_frame") or ""
-        if given and given != link:
-            must = f"'{link}', the link whose goal scenario.request gives (or left out)"
-            raise SettingError("robot.tool_frame", must, given)
-        settings["tool_frame"] = link
+    settings, request = dict(robot), task.plan_request
+    for name, requested, what in (
+        ("group", request.group, "the group of scenario.request"),
+        ("tool_frame", request.link, "the link whose goal scenario.request gives"),
+    ):
+        typed, must = robot.get(name) or "", f"'{requested}', {what} (or left out)"
+        demand(not requested or typed in ("", requested), f"robot.{name}", must, typed)
+    chooses_joints = robot.get("joints") or robot.get("groups")
+    if request.group and not chooses_joints and robot.get("srdf"):
+        settings["group"] = request.group
+    if request.link:
+        settings["tool_frame"] = request.link
     settings["fixed"] = dict(robot.get("fixed") or {}) | _standing(task.state, settings)
     return {**plain, "robot": settings}
 
@@ -184,16 +179,16 @@ def _with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
 def _standing(state: dict[str, float], settings: dict[str, Any]) -> dict[str, float]:
     """Return the start state of joints that stand still, but fixed and mimicking ones [deg, m]."""
     robot: Urdf = build(settings, component_class, PARTS[0])
-    moving, found = joint_roles(robot).moving, {}
+    moving, standing = joint_roles(robot).moving, {}
     for name, value in state.items():
         joint = robot.file.joints.get(name)
         if joint is None or joint.mimic is not None or name in moving:
             continue
         if joint.kind in TURNING:
-            found[name] = value / DEGREE
+            standing[name] = value / DEGREE
         elif joint.kind == SLIDING:
-            found[name] = value
-    return found
+            standing[name] = value
+    return standing
 
 
 def _with_named_states(config: dict[str, Any]) -> dict[str, Any]:
@@ -204,7 +199,7 @@ def _with_named_states(config: dict[str, Any]) -> dict[str, Any]:
     scenario = config.get("scenario")
     if not isinstance(scenario, dict) or scenario.get(TARGET) not in OF_ARMS:
         return config
-    several, found = OF_ARMS[scenario[TARGET]], dict(scenario)
+    several, with_values = OF_ARMS[scenario[TARGET]], dict(scenario)
     for name in FIELDS:
         value = scenario.get(name)
         listed = several and isinstance(value, list) and any(isinstance(v, str) for v in value)
@@ -214,13 +209,12 @@ def _with_named_states(config: dict[str, Any]) -> dict[str, Any]:
         if not isinstance(robot, Robot):
             raise SettingError("robot", "one whose SRDF names states", None)
         states = robot.build().states
-        given = value if isinstance(value, list) else [value] * len(states)
-        if len(given) != len(states):
-            must = f"one state or list per arm of the robot ({len(states)})"
-            raise SettingError(f"scenario.{name}", must, value)
+        of_arms = value if isinstance(value, list) else [value] * len(states)
+        must = f"one state or list per arm of the robot ({len(states)})"
+        demand(len(of_arms) == len(states), f"scenario.{name}", must, value)
         arms = [
             state.values_of(own, f"scenario.{name}") if isinstance(own, str) else own
-            for own, state in zip(given, states, strict=True)
+            for own, state in zip(of_arms, states, strict=True)
         ]
-        found[name] = arms if several else arms[0]
-    return {**config, "scenario": found}
+        with_values[name] = arms if several else arms[0]
+    return {**config, "scenario": with_values}

@@ -27,6 +27,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from evoexp import shipped
+from evoexp.attachments import file_content
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.configuration import overrides as syntax
 from evoexp.configuration import search_path
@@ -35,8 +36,8 @@ from evoexp.configuration.conditions import FOLDER, Builder, Composed, Entry, co
 from evoexp.configuration.experiment import Budget, Built, Experiment
 from evoexp.configuration.overrides import NOT_IDENTITY, SCALARS, SWEEP, Choice, Override, Span
 from evoexp.configuration.search_path import EXPERIMENT, chosen, find, groups, is_file, options
-from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
-from evoexp.input_files import MEGABYTE, read_bounded
+from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, demand
+from evoexp.input_files import MEGABYTE
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
@@ -75,8 +76,8 @@ def expand(
     asked = rest.pop(EXPERIMENT, None)
     names = [each.option() for each in syntax.single_values(asked)] if asked else [None]
     files = [None if name is None else find(EXPERIMENT, name) for name in names]
-    if len({file and file.name for file in files}) < len(files):
-        raise SettingError(EXPERIMENT, "names that differ", ",".join(map(str, names)))
+    differ = len({file and file.name for file in files}) == len(files)
+    demand(differ, EXPERIMENT, "names that differ", ",".join(map(str, names)))
     return [_expand_one(file, rest, only, space) for file in files]
 
 
@@ -90,16 +91,14 @@ def parse(text: str) -> Override:
         indexed = re.sub(r"\[(\d+)\]", r".\1", key)  # `a[0]` is `a.0`
         found = parser.parse_override(f"{indexed}{equals}{typed}")
         key, texts = found.key_or_group, [typed]
-        if not key or found.package is not None:
-            raise SettingError("override", "key=value", text)
+        demand(key and found.package is None, "override", "key=value", text)
         span = None
         if found.is_interval_sweep():
             span = _span(key, found.value(), typed)
             texts = [str(span.low), str(span.high)]
         elif found.is_sweep_override():
-            if found.value_type not in _SWEEPS:
-                must = "values that can be enumerated: a,b,c or range(…)"
-                raise SettingError(key, must, texts[0])
+            must = "values that can be enumerated: a,b,c or range(…)"
+            demand(found.value_type in _SWEEPS, key, must, texts[0])
             texts = list(found.sweep_string_iterator())
         data: list[Any] = [parser.parse_override(f"{key}={each}").value() for each in texts]
     except (HydraException, ValueError, RecursionError):
@@ -117,9 +116,9 @@ def parse(text: str) -> Override:
 def _span(key: str, interval: Any, typed: str) -> Span:
     low, high, is_log = interval.start, interval.end, "log" in interval.tags
     is_plain = key not in groups() and interval.tags <= {"log"}
-    if not is_plain or not -math.inf < low < high < math.inf or (is_log and low <= 0):
-        must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
-        raise SettingError(key, must, typed)
+    is_span = is_plain and -math.inf < low < high < math.inf and (low > 0 or not is_log)
+    must = "a setting's interval(low,high) with low < high (in tag(log,…) both above 0)"
+    demand(is_span, key, must, typed)
     return Span(low, high, 1 if isinstance(low, int) else None, is_log)
 
 
@@ -219,9 +218,8 @@ def _expand_one(
     ).of(built)
     if not space:
         return experiment
-    if importlib.util.find_spec("optuna") is None:
-        must = "left out: optuna needs pip install 'evoexp[tuning]'"
-        raise SettingError(SWEEP, must, "optuna")
+    must = "left out: optuna needs pip install 'evoexp[tuning]'"
+    demand(importlib.util.find_spec("optuna"), SWEEP, must, "optuna")
     from evoexp.configuration.setting_search import SearchSettings, with_search  # pandas
 
     settings = build_settings(SearchSettings, base[SWEEP], SWEEP)
@@ -275,11 +273,10 @@ def readings(label: str, entry: Any) -> Iterator[tuple[str, list[str]]]:
         raise SettingError(f"{field}.{unknown[0]}", f"one of {', '.join(PARTS)}", parts[unknown[0]])
     own, readings, beside = (parts.get(part, default) for part, default in PARTS.items())
     for part, each in (("readings", readings), ("beside", beside)):
-        if not isinstance(each, dict):
-            raise SettingError(f"{field}.{part}", f"a mapping of labels to {must}s", each)
+        demand(isinstance(each, dict), f"{field}.{part}", f"a mapping of labels to {must}s", each)
     for each in (own, *readings.values(), *beside.values()):
-        if not isinstance(each, list) or not all(isinstance(text, str) for text in each):
-            raise SettingError(field, must, each)
+        are_words = isinstance(each, list) and all(isinstance(text, str) for text in each)
+        demand(are_words, field, must, each)
     alone = {"": list[str]()}
     for first, second in itertools.product({**alone, **readings}, {**alone, **beside}):
         words = ", ".join(filter(None, (label, first, second)))
@@ -353,17 +350,13 @@ def _miswritten(file: Option) -> EvoexpError | None:
 
 def check_file(path: Path) -> None:
     """Refuse an option file that is too large, or that unfolds to too many values."""
+    content = file_content(path, "option", MAX_FILE)
     try:
-        content = read_bounded(path, MAX_FILE)
         unfolded = _num_values(yaml.parse(content, yaml.CSafeLoader))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError("option", f"a file that can be read ({reason})", str(path)) from None
     except (yaml.YAMLError, ValueError, RecursionError):
         return  # told by whoever reads it, if anybody does
-    if unfolded > MOST_VALUES:
-        must = f"a file of at most {MOST_VALUES:,} values, aliases unfolded, {MOST_NESTED} deep"
-        raise SettingError("option", must, str(path))
+    must = f"a file of at most {MOST_VALUES:,} values, aliases unfolded, {MOST_NESTED} deep"
+    demand(unfolded <= MOST_VALUES, "option", must, str(path))
 
 
 def _num_values(events: Iterator[yaml.Event]) -> int:

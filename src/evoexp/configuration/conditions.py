@@ -22,7 +22,7 @@ from evoexp.configuration.building import MARK, condition_of
 from evoexp.configuration.experiment import Budget, Built
 from evoexp.configuration.overrides import DELETE, Choice, Override, known_instead, single_values
 from evoexp.configuration.search_path import chosen
-from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
+from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, demand
 from evoexp.shipped import Option
 
 SAME = " ≡ "  # between labels of one condition
@@ -77,7 +77,7 @@ class Builder(NamedTuple):
         picked = rejoined(only, names)
         named = [row for row in rows if row.is_named(picked)] or rows
         self._refuse_unused(overrides, named)
-        found: dict[str, tuple[list[Crossed], Built]] = {}  # by the condition's identity
+        same: dict[str, tuple[list[Crossed], Built]] = {}  # by the condition's identity
         for row in rows:
             try:
                 built = self._built(row.choice)
@@ -85,16 +85,16 @@ class Builder(NamedTuple):
                 if row in named:
                     raise
                 continue
-            found.setdefault(built.condition.id, ([], built))[0].append(row)
-        groups = list(found.values())
+            same.setdefault(built.condition.id, ([], built))[0].append(row)
+        groups = list(same.values())
         labels = labels_of(groups)
         picked = rejoined(only, known := {*labels, *names})
         if unknown := [label for label in picked if label not in known]:
             raise UnknownOption("--only", unknown[0], known)
         return {
             label: built
-            for label, (same, built) in zip(labels, groups, strict=True)
-            if not picked or label in picked or any(row.is_named(picked) for row in same)
+            for label, (members, built) in zip(labels, groups, strict=True)
+            if not picked or label in picked or any(row.is_named(picked) for row in members)
         }
 
     def _built(self, choice: Choice) -> Built:
@@ -152,18 +152,17 @@ def _problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
             raise SettingError(key, f"left out beside {FOLDER}", choice[key].text)
     folder = "".join(str(value.data) for value in choice[FOLDER].values)
     root = Path(located(folder))
-    if "\0" in folder or not root.is_dir():
-        raise SettingError(FOLDER, "a folder of problems", folder)
+    demand("\0" not in folder and root.is_dir(), FOLDER, "a folder of problems", folder)
     scenes = sorted([*root.glob("scene*.yaml"), *root.glob("*/scene*.yaml")])
-    if not scenes or len(scenes) > MOST_PROBLEMS:
-        must = f"a folder of 1 to {MOST_PROBLEMS:,} problems (scene0001.yaml, request0001.yaml, …)"
-        raise SettingError(FOLDER, must, f"{folder} with {len(scenes) or 'none'}")
+    must = f"a folder of 1 to {MOST_PROBLEMS:,} problems (scene0001.yaml, request0001.yaml, …)"
+    was = f"{folder} with {len(scenes) or 'none'}"
+    demand(0 < len(scenes) <= MOST_PROBLEMS, FOLDER, must, was)
     rest = {key: override for key, override in choice.items() if key != FOLDER}
     for scene in scenes:
         number = scene.stem.removeprefix("scene")
         request = scene.with_name(f"request{number}.yaml")
-        if not request.is_file():
-            raise SettingError(FOLDER, f"a folder with {request.name} beside every scene", folder)
+        must = f"a folder with {request.name} beside every scene"
+        demand(request.is_file(), FOLDER, must, folder)
         files = {}
         for key, path in ((SCENE, str(scene)), (REQUEST, str(request))):
             files[key] = Override("", key, (syntax.Value(path, path),), False, f"{key}={path}")
@@ -177,22 +176,20 @@ def refuse_equal_labels(rows: Iterable[Crossed]) -> None:
     """Refuse labels that occur twice, or cannot be printed."""
     labels = set[str]()
     for row in rows:
-        if not row.label.isprintable():
-            raise SettingError("conditions", "labels of printable characters", row.label)
-        if row.label in labels:
-            raise SettingError("conditions", "labels that differ", row.label)
+        demand(row.label.isprintable(), "conditions", "labels of printable characters", row.label)
+        demand(row.label not in labels, "conditions", "labels that differ", row.label)
         labels.add(row.label)
 
 
 def rejoined(parts: Sequence[str], labels: Container[str]) -> list[str]:
     """Join the parts of labels that were split at commas of theirs; the longest label wins."""
-    found, start = list[str](), 0
+    joined, start = list[str](), 0
     while start < len(parts):
         ends = range(len(parts), start, -1)
         end = next((k for k in ends if ", ".join(parts[start:k]) in labels), start + 1)
-        found.append(", ".join(parts[start:end]))
+        joined.append(", ".join(parts[start:end]))
         start = end
-    return found
+    return joined
 
 
 def labels_of(groups: Sequence[Group]) -> list[str]:

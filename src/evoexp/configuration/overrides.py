@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from evoexp.configuration.search_path import EXPERIMENT, find, groups, options
-from evoexp.errors import EvoexpError, SettingError, UnknownSetting, nearest
+from evoexp.errors import EvoexpError, SettingError, UnknownSetting, demand, nearest
 from evoexp.registry import component_class
 from evoexp.validation import TARGET
 
@@ -95,59 +95,52 @@ Choice = Mapping[str, Override]  # by key, each with one value
 
 def collect(overrides: Iterable[Override]) -> dict[str, Override]:
     """Return overrides by key, after refusing overrides that no configuration can take."""
-    found: dict[str, Override] = {}
+    by_key: dict[str, Override] = {}
     for override in overrides:
-        known = found.setdefault(override.key, override)
-        if known.text != override.text:
-            raise SettingError(override.key, "given once", f"{known.text} {override.text}")
-        if (group := override.key) not in groups():
+        group, prefix, text = override.key, override.prefix, override.text
+        first = by_key.setdefault(group, override).text
+        demand(first == text, group, "given once", f"{first} {text}")
+        if group not in groups():
             _check_setting(override)
             continue
-        if override.prefix == DELETE and group not in OPTIONAL:
-            raise SettingError(group, "given", override.text)
-        for each in single_values(override):
-            name = each.option()
+        demand(prefix != DELETE or group in OPTIONAL, group, "given", text)
+        for value in single_values(override):
+            name = value.option()
             if name is not None or group not in OPTIONAL:
                 find(group, "null" if name is None else name)
-        if override.prefix in (ADD, FORCE):
-            raise SettingError(group, f"given without {override.prefix}", override.text)
-    return found
+        demand(prefix not in (ADD, FORCE), group, f"given without {prefix}", text)
+    return by_key
 
 
 def _check_setting(override: Override) -> None:
-    key, text, roots = override.key, override.text, [*groups(), *SCALARS]
-    if override.root == "hydra":
-        part = next(iter(re.findall(r"hydra[./](\w+)", key)), "")
-        instead = HYDRAS_OWN.get(part, "evoexp show experiment=NAME prints the settings")
-        must = f"a setting of evoexp (instead of Hydra's: {instead})"
-        raise SettingError("override", must, text)
-    if "/" in key:
-        raise SettingError("override", "key=value", text)
-    if override.root == "conditions":
-        must = "left to the experiment's file (choose among them: --only LABEL)"
-        raise SettingError("conditions", must, text)
-    if key == "budget.name":
-        raise SettingError(key, "left as it is: claims are judged by it", text)
-    if override.root == EXPERIMENT:
-        raise SettingError(key, "left out: an experiment has no settings of its own", text)
-    if override.prefix and override.root not in roots:
+    key, root, text = override.key, override.root, override.text
+    part = next(iter(re.findall(r"hydra[./](\w+)", key)), "")
+    instead = HYDRAS_OWN.get(part, "evoexp show experiment=NAME prints the settings")
+    must = f"a setting of evoexp (instead of Hydra's: {instead})"
+    demand(root != "hydra", "override", must, text)
+    demand("/" not in key, "override", "key=value", text)
+    must = "left to the experiment's file (choose among them: --only LABEL)"
+    demand(root != "conditions", "conditions", must, text)
+    demand(key != "budget.name", key, "left as it is: claims are judged by it", text)
+    demand(root != EXPERIMENT, key, "left out: an experiment has no settings of its own", text)
+    if override.prefix and root not in (roots := [*groups(), *SCALARS]):
         raise UnknownSetting(key, roots)
-    if override.prefix == DELETE and key in SCALARS:
-        raise SettingError(key, "given", text)
+    demand(override.prefix != DELETE or key not in SCALARS, key, "given", text)
 
 
 def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
     """Refuse overrides that are swept over but may not be."""
     for key, override in overrides.items():
-        if override.span is not None and override.span.is_interval:
-            must = "values that can be enumerated: a,b,c or range(…)"
-            must += " (or searched by sweep=optuna)" if override.root in SEARCHED else ""
-            raise SettingError(key, must, override.typed)
-        if override.is_swept and not multirun:
-            raise SettingError(key, "one value (or add -m to sweep over several)", override.typed)
-        if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
+        must = "values that can be enumerated: a,b,c or range(…)"
+        must += " (or searched by sweep=optuna)" if override.root in SEARCHED else ""
+        is_interval = override.span is not None and override.span.is_interval
+        demand(not is_interval, key, must, override.typed)
+        if override.is_swept:
+            must = "one value (or add -m to sweep over several)"
+            demand(multirun, key, must, override.typed)
             must = "one value: only settings of a condition can be swept"
-            raise SettingError(key, must, override.typed)
+            may_be = key == EXPERIMENT or override.root not in NOT_IDENTITY
+            demand(may_be, key, must, override.typed)
     refuse_equal_values(overrides)
 
 
@@ -155,8 +148,8 @@ def refuse_equal_values(overrides: Choice) -> None:
     """Refuse overrides that are swept over one value twice."""
     for key, override in overrides.items():
         texts = [value.text for value in override.values]
-        if key != EXPERIMENT and len(set(texts)) < len(texts):
-            raise SettingError(key, "values that differ", override.typed)
+        differ = key == EXPERIMENT or len(set(texts)) == len(texts)
+        demand(differ, key, "values that differ", override.typed)
 
 
 def search_space(overrides: Choice) -> Choice:
@@ -165,9 +158,8 @@ def search_space(overrides: Choice) -> Choice:
         return {}
     swept = {key: override for key, override in overrides.items() if override.is_swept}
     space = {key: override for key, override in swept.items() if override.root in SEARCHED}
-    if not space:
-        must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
-        raise SettingError(SWEEP, must, " ".join(each.text for each in swept.values()))
+    must = "beside a swept setting of planner, ga or control: planner.walk_step=interval(1,8)"
+    demand(space, SWEEP, must, " ".join(override.text for override in swept.values()))
     refuse_equal_values(space)
     return space
 
@@ -209,13 +201,12 @@ def expand_entry(
     """
     field, parsed = f"conditions.{template}", collect(overrides)
     for key, override in parsed.items():
-        if override.root in NOT_IDENTITY:
-            must = f"free of {key}, which belongs to the whole experiment"
-            raise SettingError(field, must, override.text)
+        must = f"free of {key}, which belongs to the whole experiment"
+        demand(override.root not in NOT_IDENTITY, field, must, override.text)
     swept = [key for key, override in parsed.items() if override.is_swept]
     pieces = template.split("{}")
-    if len(pieces) - 1 not in (0, len(swept)):
-        raise SettingError(field, "a label with one {} per swept override, or none", template)
+    must = "a label with one {} per swept override, or none"
+    demand(len(pieces) - 1 in (0, len(swept)), field, must, template)
     for chosen in sweep(parsed):
         if len(pieces) > 1:
             values = (chosen[key].values[0].text for key in swept)
@@ -289,10 +280,10 @@ def _parts(key: str) -> list[tuple[int, str]]:
 
 def _delete(config: dict[str, Any], override: Override) -> None:
     node, last, present = _place(config, override)
-    if isinstance(node, dict) and last not in node:
-        raise SettingError(override.key, "an existing setting, for ~ to delete", override.text)
-    if override.values and override.values[0].data != present:
-        raise SettingError(override.key, f"{present!r}, for ~ to delete", override.typed)
+    is_there = not isinstance(node, dict) or last in node
+    demand(is_there, override.key, "an existing setting, for ~ to delete", override.text)
+    is_meant = not override.values or override.values[0].data == present
+    demand(is_meant, override.key, f"{present!r}, for ~ to delete", override.typed)
     del node[last]
 
 

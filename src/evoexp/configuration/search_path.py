@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from evoexp import shipped
-from evoexp.errors import RegistrationError, SettingError, UnknownOption
+from evoexp.errors import RegistrationError, UnknownOption, demand
 from evoexp.registry import CONF, Registration, registrations
 from evoexp.shipped import Option
 
@@ -55,8 +55,7 @@ def folders() -> list[Folder]:
     variable = os.environ.get(VARIABLE, "").split(os.pathsep)
     found = []
     for name, directory in [*typed, *((VARIABLE, entry) for entry in variable if entry)]:
-        if not Path(directory).is_dir():
-            raise SettingError(name, "a folder", directory)
+        demand(Path(directory).is_dir(), name, "a folder", directory)
         found.append(Folder(Path(directory).resolve(), directory))
     for each in sorted(registrations(CONF), key=lambda each: (each.is_own, each)):
         if each.is_own:
@@ -104,11 +103,10 @@ def chosen(group: str) -> str:
 def find(group: str, name: str) -> Option:
     """Return an option: its file and where it comes from."""
     if group == EXPERIMENT and is_file(name):
-        if not os.path.isfile(name):
-            raise SettingError(EXPERIMENT, "the path of a file, or the name of an experiment", name)
-        stem = Path(name).stem  # also that of the report's folder
-        if not stem.strip(".") or not stem.isprintable():
-            raise SettingError(EXPERIMENT, "a file with a plain name", name)
+        must, stem = "the path of a file, or the name of an experiment", Path(name).stem
+        demand(os.path.isfile(name), EXPERIMENT, must, name)
+        is_plain = stem.strip(".") and stem.isprintable()  # it names the report's folder, too
+        demand(is_plain, EXPERIMENT, "a file with a plain name", name)
         return Option(group, stem, name, str(Path(name).resolve()))
     for folder in folders() if os.path.basename(name) == name else ():
         path = os.path.join(folder.path, group, f"{name}.yaml")

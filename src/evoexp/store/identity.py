@@ -45,7 +45,6 @@ class Difference(NamedTuple):
     now: Any
 
     def __str__(self) -> str:
-        """Return the difference in one line."""
         return f"{self.name}: was {self.was}, now {self.now}"
 
 

@@ -59,10 +59,9 @@ def check_run(outputs: Path, name: str) -> RunCheck:
     """Look at a stored run's files, but for its logs."""
     path, leftovers = outputs / "runs" / name, list[str]()
     try:
-        names = [each.name for each in sorted(path.iterdir()) if each.name not in _KNOWN]
-        for each in sorted((path / REPLICATES).glob("*")):
-            if not RunDirectory.is_own(each.name):
-                names.append(f"{REPLICATES}/{each.name}")
+        names = sorted(file.name for file in path.iterdir() if file.name not in _KNOWN)
+        logs = sorted(file.name for file in (path / REPLICATES).glob("*"))
+        names += [f"{REPLICATES}/{name}" for name in logs if not RunDirectory.is_own(name)]
         for other in names:
             kind = "temporary" if files.is_temporary(other) else "unknown"
             kind = "set aside earlier" if files.is_set_aside(other) else kind
@@ -105,14 +104,12 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
         log = read_log(path, place)
         summary = log.summary
         log.arrays()  # each is one
-        problem = next(_contradictions(log), "")
-        if not problem:
-            try:
-                problem = next((f"altered: {each}" for each in evaluate(path, log)), "")
-            except EvoexpError as error:
-                unevaluated = files.reason(path, error)
+        evaluated = (f"altered: {contradiction}" for contradiction in evaluate(path, log))
+        problem = next(itertools.chain(_contradictions(log), evaluated), "")
     except CorruptLog as error:
         problem = files.reason(path, error)
+    except EvoexpError as error:
+        unevaluated = files.reason(path, error)
     if problem:
         with contextlib.suppress(CorruptLog):
             read_summary(path, place)
@@ -157,12 +154,11 @@ def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
     _set_aside(run, run.damaged_files(config_json), "written again")
     logs = damaged_logs(run)
     for name, why in logs.items():
-        try:
-            read_summary(run.replicates / name)
-        except OtherVersion:
-            raise StoreError(f"run {run.hash12}: {run.replicates / name}: {why}") from None
-        except CorruptLog:
-            pass
+        with contextlib.suppress(CorruptLog):
+            try:
+                read_summary(run.replicates / name)
+            except OtherVersion:
+                raise StoreError(f"run {run.hash12}: {run.replicates / name}: {why}") from None
     for then, is_again in (("run again", True), ("set aside: never asked for", False)):
         names = [name for name in logs if (replicate_of(name) in again) is is_again]
         _set_aside(run, {f"{REPLICATES}/{name}": logs[name] for name in names}, then)

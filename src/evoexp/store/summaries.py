@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import GenerationRow, ReplicateSummary, flatten
-from evoexp.store.files import listed, reason, set_aside, warn, write_file
+from evoexp.store.files import first_of, listed, reason, set_aside, warn, write_file
 from evoexp.store.identity import ORIGIN, run_context
 from evoexp.store.log import field_types
 from evoexp.store.log_reader import DTYPES, check_sums, generation_columns, read_summary
@@ -64,7 +64,7 @@ def write_summary(
     replicate has a row, in order; a failed one has condition, replicate, status and stop_reason,
     everything else is null. A damaged log has no row.
     """
-    known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
+    known = {run.log_path(k).name: summary for k, summary in (written or {}).items()}
     summary = _up_to_date(run, known)
     if summary.settings is None:
         _write(run, summary)
@@ -126,16 +126,15 @@ def altered(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> str
     if stored is None or stored.settings is None:
         return ""
     rows = dict(zip(stored.row_names, stored.table.to_pylist(), strict=True))
-    names = [
+    others = [
         name
         for name, summary in summaries.items()
         if name in rows
         and stored.files[name] == stamps.get(name)
-        and _given(rows[name]) != _given(flatten(summary))
+        and _as_text(rows[name]) != _as_text(flatten(summary))
     ]
-    if names:
-        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        return f"altered: it does not repeat {names[0]}{more}"
+    if others:
+        return f"altered: it does not repeat {', '.join(first_of(others, 1))}"
     try:
         run.check()
     except StoreError:  # whose settings nothing tells
@@ -147,7 +146,7 @@ def altered(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> str
     return ""
 
 
-def _given(row: Mapping[str, Any]) -> str:
+def _as_text(row: Mapping[str, Any]) -> str:
     """Return a row as text, so that NaN is equal to itself; without what it does not have."""
     return repr(sorted((name, value) for name, value in row.items() if value is not None))
 
@@ -159,8 +158,8 @@ def replicate_of(name: str) -> int:
 
 def distinct(runs: Runs) -> list[RunDirectory]:
     """Return the runs in order, each once."""
-    given = [runs] if isinstance(runs, RunDirectory) else runs
-    return list({run.path: run for run in given}.values())
+    several = [runs] if isinstance(runs, RunDirectory) else runs
+    return list({run.path: run for run in several}.values())
 
 
 def _current(run: RunDirectory, thorough: bool = False, tell: bool = False) -> _Summary:

@@ -99,12 +99,18 @@ def test_the_least_memory_is_enough(megabytes: int, words: tuple[str, ...], tmp_
     assert run_within(megabytes, tmp_path / "outputs", *words) == (0, "")
 
 
+NO_SEGMENT = "libx.so: failed to map segment from shared object"
+
+
 @pytest.mark.parametrize(
     ("error", "text"),
     [
         (MemoryError(), "the system gives no more"),
         (MemoryError("Unable to allocate 3 GiB"), "Unable to allocate 3 GiB"),
         (OSError(errno.ENOMEM, "Cannot allocate memory"), "[Errno 12] Cannot allocate memory"),
+        (RuntimeError("can't start new thread"), "can't start new thread"),
+        (ImportError(f"advice\n\n{NO_SEGMENT}"), NO_SEGMENT),
+        (ImportError("no module named nothing"), ""),
         (OSError(errno.ENOSPC, "No space"), ""),
         (ValueError("x"), ""),
     ],
@@ -112,6 +118,9 @@ def test_the_least_memory_is_enough(megabytes: int, words: tuple[str, ...], tmp_
 def test_errors_that_mean_it(error: Exception, text: str) -> None:
     assert memory_shortage(error).startswith(f"out of memory: {text}" if text else "")
     assert bool(memory_shortage(error)) == bool(text)
+    outer = RuntimeError("a library explains at length")
+    outer.__cause__ = error
+    assert text in memory_shortage(outer)
 
 
 def test_a_refusal_stays_a_refusal(

@@ -3,8 +3,8 @@
 Whatever library makes a temporary file, in this process or a worker, makes it in the command's
 folder, which is removed at the end.
 
-Where few addresses are allowed (`ulimit -v`), some libraries end the process by themselves, and the
-compiler never comes back: such a command is refused at once.
+Where addresses are limited (`ulimit -v`), a library that cannot be loaded is an `ImportError`, a
+thread that cannot be started a `RuntimeError`, and some libraries end the process by themselves.
 
 Ctrl-C, SIGTERM and a terminal that closes each end a command in the same orderly way. The first
 signal raises `Interrupted`, by which everything is closed that a command has open. While that
@@ -40,6 +40,7 @@ from evoexp.numeric.cache_folder import remove_at_exit
 OUTPUT = "standard output"  # the file name of its errors
 MEGABYTE = 10**6
 LEAST_MB = 2_500  # [MB] of addresses; a shipped run that compiles its kernels took 2,219
+_TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new thread", "bad_alloc")
 PATIENCE_S = 3.0  # [s] that closing may take before what it waits for is interrupted, too
 CLOSING_S = 15.0  # [s] that closing may take at all
 ENDING_S = 3.0  # [s] that the interpreter may take to end: an interrupted thread may never do
@@ -67,11 +68,23 @@ def refuse_too_little_memory() -> None:
 
 def memory_shortage(error: BaseException) -> str:
     """Describe the lack of memory that an error means; empty if it means something else."""
-    if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
+    chain: list[BaseException] = []
+    cause: BaseException | None = error
+    while cause is not None and cause not in chain:
+        chain.append(cause)
+        cause = cause.__cause__ or cause.__context__
+    texts = []
+    for each in chain:
+        lines = [line.strip() for line in str(each).splitlines() if line.strip()]
+        named = [line for line in lines if any(text in line.lower() for text in _TEXTS)]
+        is_named = isinstance(each, OSError) and each.errno == errno.ENOMEM
+        if named or is_named or isinstance(each, MemoryError):
+            texts.append((named or lines or ["the system gives no more"])[0])
+    if not texts:
         return ""
-    lines, allowed = str(error).strip().splitlines(), allowed_addresses()
+    allowed = allowed_addresses()
     limit = f" (`ulimit -v` allows {allowed // MEGABYTE:,} MB)" if allowed is not None else ""
-    return f"out of memory: {lines[0] if lines else 'the system gives no more'}{limit}"
+    return f"out of memory: {texts[-1]}{limit}"
 
 
 def open_streams() -> None:

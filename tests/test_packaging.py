@@ -62,7 +62,7 @@ def test_contents(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     ours = {name for name in names if not name.partition("/")[0].endswith(".dist-info")}
     data = {"claims.yaml", "page.yaml", "claim_kinds.yaml", "moveit_messages.yaml"}
-    data |= {"urdf_elements.yaml"}
+    data |= {"urdf_elements.yaml", "page_keys.yaml"}
     package = {
         path.relative_to(SOURCE.parent).as_posix()
         for path in SOURCE.rglob("*")

@@ -11,8 +11,7 @@ from coal_shapes import distance_of_point, geometry_of, mesh, placed
 from evoexp.collision.body_table import HULL, UnsupportedShape
 from evoexp.collision.scene import Scene, geometry_scene, obstacle_shapes, scene
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.robots.arms import Arms, PlanarChain
-from evoexp.robots.mobile_robots import FloorManipulator, MobileArm
+from evoexp.robots.arms import Arms, FloorManipulator, MobileArm, PlanarChain
 from evoexp.scenarios.obstacles import obstacle_table
 from obstacle_samples import box, capsule, cylinder, ellipse, half_space, sphere
 from references import arms_6r

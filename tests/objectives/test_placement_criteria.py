@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.objectives.placement_criteria import Model, PlacementCriteria, Task
-from evoexp.robots.mobile_robots import MobileArm
+from evoexp.robots.arms import MobileArm
 
 LENGTHS = (1.0, 1.0, 0.5)
 ANYTHING = np.array([[-np.inf, np.inf]] * 6)

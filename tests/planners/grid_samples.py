@@ -8,7 +8,7 @@ from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.evolution.operators.operator import ScaledGenetic
 from evoexp.planners.grid_path_ga.planner import GridPathGa, PathCost, Problem
-from evoexp.robots.mobile_robots import FloorPlatform
+from evoexp.robots.arms import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 
 FIELDS = {

@@ -9,7 +9,7 @@ from evoexp.errors import SettingError
 from evoexp.paths.grids import Grid, NodeArray
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.records import FloatArray
-from evoexp.robots.mobile_robots import FloorPlatform
+from evoexp.robots.arms import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from planners.grid_samples import planner, scenario
 from planners.runs import evolved, verdict

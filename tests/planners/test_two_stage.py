@@ -11,7 +11,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.answers import Proofs
-from evoexp.robots.mobile_robots import FloorManipulator
+from evoexp.robots.arms import FloorManipulator
 from evoexp.store.log_reader import read_log
 from planners.runs import ran, verdict
 

@@ -22,7 +22,7 @@ from evoexp.papers.rana.figures import arm_models, arm_motions
 from evoexp.report.figures import convergence, side_by_side, style
 from evoexp.report.figures.side_by_side import draw_box
 from evoexp.report.pages.page_builder import page_of
-from evoexp.report.pages.swept import labelled, main_effects, sweep_of
+from evoexp.report.pages.sweeps import labelled, main_effects, sweep_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.inference import Proportion

@@ -34,7 +34,7 @@ from evoexp.store.identity import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 if TYPE_CHECKING:
-    from evoexp.report.pages.searched import Trial
+    from evoexp.report.pages.sweeps import Trial
 
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds

@@ -24,7 +24,7 @@ from optuna.trial import TrialState
 from evoexp.configuration.experiment import Built, Experiment
 from evoexp.configuration.overrides import SWEEP, Choice, Override, Value
 from evoexp.errors import Busy, EvoexpError, SettingError, StoreError, brief
-from evoexp.report.pages.searched import Searched, Trial, score_table
+from evoexp.report.pages.sweeps import Searched, Trial, score_table
 from evoexp.report.results.stored_results import gather
 from evoexp.store.run_directory import outputs_root
 from evoexp.validation import Count, NonNegativeCount, Positive, Settings

@@ -94,6 +94,7 @@ def parsed_xml(content: bytes, field: str) -> Any:
 
     def start(name: str, attributes: Any) -> None:
         nonlocal count
+        name = "capsule" if name == DRAKE_CAPSULE else name
         open_tags.append(name)
         count += 1
         if len(open_tags) > MOST_NESTED or count > MOST_ELEMENTS:
@@ -268,8 +269,6 @@ class _Check:
 
     def element(self, element: Any, where: str) -> None:
         """Check an element, and those in it, of the link or joint that is named by `where`."""
-        if element.tag == DRAKE_CAPSULE:
-            element.tag = "capsule"
         tag = element.tag
         if tag in ("link", "joint"):
             where = f"{tag} '{element.get('name', '')}'"
@@ -283,7 +282,7 @@ class _Check:
             known = known[:3]
         names = []
         for child in element:
-            if child.tag in known or (tag == "geometry" and child.tag == DRAKE_CAPSULE):
+            if child.tag in known:
                 self.element(child, where)
                 names.append(child.tag)
             else:

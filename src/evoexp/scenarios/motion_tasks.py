@@ -57,11 +57,10 @@ class Posture(Settings):
     elbow: Literal["left", "right"] | None = None
 
     def _check(self) -> None:
-        if (self.angles is None) == (self.tip is None):
-            was = None if self.angles is None else "both"
-            raise SettingError("angles", "given, or else tip with elbow", was)
-        if (self.tip is None) != (self.elbow is None):
-            raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
+        is_one, was = (self.angles is None) != (self.tip is None), self.angles and "both"
+        demand(is_one, "angles", "given, or else tip with elbow", was)
+        is_pair = (self.tip is None) == (self.elbow is None)
+        demand(is_pair, "elbow", "given with tip, and only then (left or right)", self.elbow)
 
     def link_angles(self, field: str, base: FloatArray, lengths: FloatArray) -> FloatArray:
         """Return the link angles (2,) [deg] of a robot at a base (2,), with link lengths (2,)."""
@@ -98,11 +97,11 @@ class LinkMotion(SceneTask):
             ends.append(np.array([*map(Posture.link_angles, postures, fields, bases, lengths)]))
         start, goal = ends
         for robot in self.stationary:
-            if not 0 <= robot < len(bases):
-                raise SettingError("scenario.stationary", f"robots 0 … {len(bases) - 1}", robot)
-            if not np.array_equal(start[robot], goal[robot]):
-                must = "the same as its start, since the robot is stationary"
-                raise SettingError(f"scenario.q_goal[{robot}]", must, list(goal[robot]))
+            must = f"robots 0 … {len(bases) - 1}"
+            demand(0 <= robot < len(bases), "scenario.stationary", must, robot)
+            is_same = np.array_equal(start[robot], goal[robot])
+            must = "the same as its start, since the robot is stationary"
+            demand(is_same, f"scenario.q_goal[{robot}]", must, list(goal[robot]))
         return start, goal
 
 
@@ -311,13 +310,14 @@ class PostureTask(SceneTask):
                 self.index_of(phase.goal.object, f"{field}.goal.object")
             if is_grasp:
                 shape = self.objects[self.index_of(phase.object, f"{field}.object")].shape
-                if shape in ("half_space", "ellipse", "hull"):
-                    must = "a sphere, box, capsule or cylinder"
-                    raise SettingError(f"{field}.object", must, f"a {shape}")
+                is_solid = shape in ("sphere", "box", "capsule", "cylinder")
+                must = "a sphere, box, capsule or cylinder"
+                demand(is_solid, f"{field}.object", must, f"a {shape}")
             held = {"attach": phase.object, "detach": ""}.get(phase.then, held)
-            if phase.contacts and self.allowed_penetration is None:
-                must = f"given: {field}.contacts allows contacts"
-                raise SettingError("allowed_penetration", must, None)
+            is_given = self.allowed_penetration is not None or not phase.contacts
+            demand(
+                is_given, "allowed_penetration", f"given: {field}.contacts allows contacts", None
+            )
         demand(any(self.up), "up", "a direction, not (0, 0, 0)", list(self.up))
 
     @property

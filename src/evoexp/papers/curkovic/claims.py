@@ -360,7 +360,6 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "effort": lambda condition, settings: measures.evaluations_to(
         condition, settings.threshold_ratio * measures.lower_bound(condition)
     ),
-    "refuted_motions": lambda defects: defects.refuted,
     # a larger radius forces the robots further apart
     "larger_radius": lambda judge, compared_radii: [
         judge.on("larger_radius", pair=row.quantity).better(row, "larger") for row in compared_radii

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from evoexp.collision.planar.planar_arms import Arm
 from evoexp.condition import Prepared
@@ -18,7 +17,7 @@ from evoexp.report.results import motion_geometry
 from evoexp.report.results.run_measures import counted, search_seconds, solved, summed, touches
 from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
 from evoexp.report.statistics import inference
-from evoexp.report.statistics.inference import Proportion, quantile
+from evoexp.report.statistics.inference import quantile
 from evoexp.report.statistics.judging import Rules
 
 TOOL_SAMPLES = 20  # per segment, where end-effectors' distances from other robots are measured
@@ -75,12 +74,12 @@ def lower_bound(condition: ConditionResults) -> float:
 
 def generations_to(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return each run's first generation with a team at or below a cost, (done,); inf: none."""
-    return _first(condition, threshold, "index")
+    return _least(condition, "index", "best_cost", threshold)
 
 
 def evaluations_to(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return each run's evaluations to a team at or below a cost, (done,); inf: none."""
-    return _first(condition, threshold, "evaluations")
+    return _least(condition, "evaluations", "best_cost", threshold)
 
 
 def expected_evaluations(condition: ConditionResults, threshold: float) -> float:
@@ -171,13 +170,14 @@ def cost_at_equal_effort(condition: ConditionResults, results: Results) -> Float
     Shape (done,); inf where it has no team by then.
     """
     budget = min(float(c.column("evaluations").min()) for c in results.with_data)
-    return _best_until(condition, "evaluations", budget)
+    return _least(condition, "best_cost", "evaluations", budget)
 
 
-def _best_until(condition: ConditionResults, column: str, most: float) -> FloatArray:
+def _least(condition: ConditionResults, column: str, within: str, most: float) -> FloatArray:
+    """Return a column's least value in the generations within a bound, (done,); inf: in none."""
     rows = condition.generations
-    costs = rows[rows[column] <= most].groupby("replicate")["best_cost"].min()
-    return _of_runs(condition, costs)
+    least = rows[rows[within] <= most].groupby("replicate")[column].min()
+    return least.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
 
 
 def cost_spread(condition: ConditionResults) -> FloatArray:
@@ -198,20 +198,10 @@ def elbow_changes(condition: ConditionResults) -> FloatArray:
     return np.array(changes)
 
 
-class Defects(NamedTuple):
-    """Counts of the solved motions that have each of the known defects."""
-
-    refuted: Proportion  # bodies collide between the configurations
-    leaving: Proportion  # the executed curve leaves the range of a joint
-    too_fast: Proportion  # a link is faster than Eq. 2 allows
-
-
-def defects(condition: ConditionResults) -> Defects:
-    """Count the solved motions that have each of the known defects."""
+def leaves_range(condition: ConditionResults) -> BoolArray:
+    """Return whether each run's executed curve leaves the range of a joint, (done,)."""
     beyond = [condition.column(str(c)) for c in condition.summaries if "out_of_range" in str(c)]
-    leaves = np.max([np.zeros(condition.done), *beyond], axis=0) > ROUNDING
-    having = touches(condition), leaves, times_over_limit(condition) > 1.0
-    return Defects(*(counted(each[solved(condition)]) for each in having))
+    return np.asarray(np.max([np.zeros(condition.done), *beyond], axis=0) > ROUNDING)
 
 
 def times_over_limit(condition: ConditionResults) -> FloatArray:
@@ -224,17 +214,6 @@ def over_limit(prepared: Prepared, solution: FloatArray) -> float:
     """Return the greatest speed of any link during a motion, over its limit by Eq. 2 [-]."""
     turns = top_speeds(executed(prepared, solution)).reshape(-1, 2) / DEGREE
     return float(np.max(turns / speed_limits(prepared)))
-
-
-def _first(condition: ConditionResults, threshold: float, column: str) -> FloatArray:
-    rows = condition.generations
-    first = rows[rows["best_cost"] <= threshold].groupby("replicate")[column].min()
-    return _of_runs(condition, first)
-
-
-def _of_runs(condition: ConditionResults, values: pd.Series) -> FloatArray:
-    """Return values by replicate as (done,), infinite where a run has none."""
-    return values.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
 
 
 class SampledMotion(NamedTuple):
@@ -323,9 +302,14 @@ def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # cost of each run's best team at generation 30, (done,); inf: it has none
-    "early_cost": lambda condition: _best_until(condition, "index", EARLY),
+    "early_cost": lambda condition: _least(condition, "best_cost", "index", EARLY),
     "too_fast": lambda condition: times_over_limit(condition) > 1.0,  # by Eq. 2, (done,)
     "touching": lambda condition: touches(condition)[solved(condition)],  # of the solved motions
+    # solved motions that fail: bodies collide between the configurations, the executed curve
+    # leaves the range of a joint, a link is faster than Eq. 2 allows
+    "refuted_motions": lambda touching: counted(touching),
+    "leaving_motions": lambda condition: counted(leaves_range(condition)[solved(condition)]),
+    "fast_motions": lambda condition, too_fast: counted(too_fast[solved(condition)]),
     # expected running time to a cost in whole evaluations, (1,)
     "expected_effort": lambda condition, threshold: np.rint(
         [expected_evaluations(condition, threshold)]

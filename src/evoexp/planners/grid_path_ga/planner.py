@@ -28,7 +28,7 @@ from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.records import Block, FloatArray
-from evoexp.robots.mobile_robots import FloorPlatform
+from evoexp.robots.arms import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegative, NonNegativeCount
 

@@ -39,8 +39,8 @@ from evoexp.planners.answers import Acceptance, in_shape, of_limits
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.records import Block, FloatArray, IntArray
+from evoexp.robots.arms import MobileArm
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.mobile_robots import MobileArm
 from evoexp.scenarios.motion_tasks import Docking
 from evoexp.validation import Component, Limits
 

@@ -24,7 +24,7 @@ from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import Best, Block, FloatArray
-from evoexp.robots.mobile_robots import ARM_JOINTS, FloorManipulator
+from evoexp.robots.arms import ARM_JOINTS, FloorManipulator
 from evoexp.scenarios.motion_tasks import Mission
 from evoexp.validation import Component
 

@@ -8,6 +8,7 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ParamSpec
 
+import numpy as np
 import pandas as pd
 
 # of coordinates and distances; rounding errors beside 0 would differ between machines
@@ -15,24 +16,27 @@ DECIMALS = 12
 
 
 Arguments = ParamSpec("Arguments")
-Rows = Iterator[tuple[object, ...]]  # of a table, one by one
+# of a table, one by one; or columns of several rows at once, beside values that all of them have
+Rows = Iterator[tuple[object, ...]]
 Parts = Iterator[Mapping[str, Any]]  # of a table, one below the other: name → column
 
 
 def table_of(
     names: str = "", *, is_rounded: bool = False
 ) -> Callable[[Callable[Arguments, Rows | Parts]], Callable[Arguments, pd.DataFrame]]:
-    """Make a table of a function that yields rows, with columns of these names, or its parts."""
+    """Make a table of a function that yields `Rows`, with columns of these names, or `Parts`."""
 
     def made(yielding: Callable[Arguments, Rows | Parts]) -> Callable[Arguments, pd.DataFrame]:
         @functools.wraps(yielding)
         def table(*arguments: Arguments.args, **named: Arguments.kwargs) -> pd.DataFrame:
-            found: Any = yielding(*arguments, **named)
-            if names:
-                found = pd.DataFrame(list(found), columns=names.split())
+            rows: list[Any] = list(yielding(*arguments, **named))
+            columns = names.split()
+            if columns and not any(np.ndim(value) for row in rows[:1] for value in row):
+                whole = pd.DataFrame(rows, columns=columns)
             else:
-                found = pd.concat(map(pd.DataFrame, found), ignore_index=True)
-            return rounded(found) if is_rounded else found
+                parts = (dict(zip(columns, row, strict=True)) if columns else row for row in rows)
+                whole = pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+            return rounded(whole) if is_rounded else whole
 
         return table
 

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
+from evoexp.report.figures import Rows, groups, marks, records, style, table_of
 from evoexp.report.figures.marks import name_curves, name_ends
-from evoexp.report.pages.swept import MOST_PANELS, Sweep, labelled
+from evoexp.report.pages.sweeps import MOST_PANELS, Sweep, labelled
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import quantile, quantiles
@@ -90,8 +90,8 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     return figure
 
 
-@table_of()
-def _condition(results: Results, condition: ConditionResults, objective: Any) -> Parts:
+@table_of("condition position quantity generation evaluations median lower upper replicates")
+def _condition(results: Results, condition: ConditionResults, objective: Any) -> Rows:
     for column in COLUMNS:
         rows = condition.generations[["replicate", "index", "evaluations", column]]
         if objective is not None:
@@ -100,13 +100,11 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
         replicates = rows.groupby("index").size().to_numpy()
         if column == "best_cost":  # a run that has ended keeps its best
             wide, replicates = wide.ffill(), np.full(len(wide), wide.shape[1])
-        median, lower, upper = quantiles(wide.to_numpy(np.float64), (0.5, 0.25, 0.75))
+        quartiles = quantiles(wide.to_numpy(np.float64), (0.5, 0.25, 0.75))
         spent = rows.pivot(index="index", columns="replicate", values="evaluations")
-        given: dict[str, Any] = {"condition": condition.label}
-        given |= {"position": results.position(condition.label), "quantity": NAMES[column]}
-        evaluations = quantiles(spent.to_numpy(np.float64), (0.5,))[0]
-        given |= {"generation": wide.index, "evaluations": evaluations, "median": median}
-        yield given | {"lower": lower, "upper": upper, "replicates": replicates}
+        (evaluations,) = quantiles(spent.to_numpy(np.float64), (0.5,))
+        curve = condition.label, results.position(condition.label), NAMES[column]
+        yield *curve, wide.index, evaluations, *quartiles, replicates
 
 
 def _curves(axes: Axes, table: pd.DataFrame) -> None:

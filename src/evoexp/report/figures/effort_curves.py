@@ -32,8 +32,8 @@ ABOVE = 0.62  # [inch] of the bar of the critical difference and the axis' numbe
 NOTE: dict[str, Any] = {"ha": "center", "va": "center", "color": style.NEUTRAL, "fontsize": 7.5}
 
 
-@table_of()
-def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> Parts:
+@table_of("planner collision_queries share targets")
+def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> Rows:
     """Return the share of (problem, target, run) that each planner has reached, over effort."""
     reached: dict[str, list[float]] = {}
     for own in runs:
@@ -42,8 +42,7 @@ def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> 
     axis = _axis(runs) if axis is None else axis
     for planner, efforts in reached.items():
         shares = [float(np.mean(np.array(efforts) <= x)) for x in axis]
-        columns = {"planner": planner, "collision_queries": axis, "share": shares}
-        yield columns | {"targets": len(efforts)}
+        yield planner, axis, shares, len(efforts)
 
 
 def _axis(runs: Sequence[PlannerRuns]) -> FloatArray:
@@ -63,8 +62,8 @@ def problem_share_table(runs: Sequence[PlannerRuns]) -> Parts:
         yield {"problem": name, **table}
 
 
-@table_of()
-def length_table(runs: Sequence[PlannerRuns]) -> Parts:
+@table_of("planner collision_queries median lower upper")
+def length_table(runs: Sequence[PlannerRuns]) -> Rows:
     """Return median and quartiles over runs of the best proven length so far, of one problem."""
     for own in runs:
         table, most = own.table, max(float(own.spent.max()), 2.0)
@@ -72,9 +71,7 @@ def length_table(runs: Sequence[PlannerRuns]) -> Parts:
         axis = np.geomspace(max(least, 1.0), most, POINTS // 2)
         early = (table[table["collision_queries"] <= x] for x in axis)
         best = np.array([own._replace(table=part).best_lengths for part in early])  # (points, runs)
-        median, lower, upper = quantiles(best, (0.5, 0.25, 0.75))
-        spread = {"median": median, "lower": lower, "upper": upper}
-        yield {"planner": own.planner, "collision_queries": axis, **spread}
+        yield own.planner, axis, *quantiles(best, (0.5, 0.25, 0.75))
 
 
 def problem_order(runs: Iterable[PlannerRuns]) -> list[str]:

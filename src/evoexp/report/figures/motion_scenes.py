@@ -22,7 +22,7 @@ from evoexp.numeric.convex_hull import hull_of
 from evoexp.playback.colours import OBJECT, OBSTACLE
 from evoexp.playback.recording import Outline, Recording, Shape
 from evoexp.records import FloatArray
-from evoexp.report.figures import Parts, groups, records, rounded, style, table_of
+from evoexp.report.figures import Parts, Rows, groups, records, rounded, style, table_of
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
@@ -73,8 +73,8 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> Parts
         yield _part(own, 2 * k + 1, names[1], recording)
 
 
-@table_of(is_rounded=True)
-def joints_table(recording: Recording) -> Parts:
+@table_of("instant value joint unit low high", is_rounded=True)
+def joints_table(recording: Recording) -> Rows:
     """Return all joints over a motion, with the robot's limits, infinite where there is none."""
     model = recording.parts[0].scene.model
     limits = np.array([model.lowerPositionLimit, model.upperPositionLimit], dtype=np.float64).T
@@ -83,8 +83,7 @@ def joints_table(recording: Recording) -> Parts:
         scale = 1.0 if joint.prismatic else 180.0 / np.pi
         low, high = scale * limits[k]
         unit = recording.length_unit if joint.prismatic else "deg"
-        columns = {"instant": recording.times, "value": scale * recording.q[:, k]}
-        yield columns | {"joint": joint.name, "unit": unit, "low": low, "high": high}
+        yield recording.times, scale * recording.q[:, k], joint.name, unit, low, high
 
 
 def _part(

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullLocator
 
 from evoexp.records import FloatArray
-from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
+from evoexp.report.figures import Rows, groups, marks, records, style, table_of
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.comparisons import Comparison, Values
 from evoexp.report.statistics.inference import Proportion, quantile, spread
@@ -27,14 +27,12 @@ DOT: dict[str, Any] = {"color": style.ARM_COLOURS[0], "markersize": 5}
 OPEN: dict[str, Any] = {"markerfacecolor": "white"}  # the look of what is not significant
 
 
-@table_of()
-def values_table(results: Results, quantities: Mapping[str, Values]) -> Parts:
+@table_of("quantity position condition replicate value failed")
+def values_table(results: Results, quantities: Mapping[str, Values]) -> Rows:
     """Return quantities (name with unit → values (done,), inf: never) of every replicate."""
     for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
-            columns = {"quantity": name, "position": position, "condition": c.label}
-            runs = {"replicate": c.summaries.index, "value": values(c), "failed": len(c.failures)}
-            yield columns | runs
+            yield name, position, c.label, c.summaries.index, values(c), len(c.failures)
 
 
 def draw_values(table: pd.DataFrame) -> Figure:

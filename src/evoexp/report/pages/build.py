@@ -25,7 +25,7 @@ from evoexp.report.pages.index import document
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Document, Drawing, Page, Table
 from evoexp.report.pages.page_values import players_of
-from evoexp.report.pages.searched import Searched
+from evoexp.report.pages.sweeps import Searched
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.shipped import Option

@@ -31,6 +31,9 @@ CSV_COLUMNS = [
 ]
 
 
+NO_VALUES = inference.Spread(np.nan, np.nan, np.nan, 0)
+
+
 class Rated(NamedTuple):
     """A condition, rated by the proven answers of its runs."""
 
@@ -55,7 +58,24 @@ class Rated(NamedTuple):
     evaluations: float = np.nan  # expected evaluations to a proven answer
     cpu_s: float = np.nan  # expected CPU time to a proven answer [s]
     # The planner's own cost of its last solution: median and quartiles over runs
-    own_cost: inference.Spread = inference.Spread(np.nan, np.nan, np.nan, 0)
+    own_cost: inference.Spread = NO_VALUES
+
+    @property
+    def share(self) -> inference.Proportion:
+        """The runs with a proven answer, of all."""
+        return inference.Proportion(self.proven, self.runs)
+
+    @property
+    def in_units(self) -> inference.Spread:
+        """Lengths in units of the targets, if there is a unit."""
+        median, lower, upper, count = self.lengths
+        units = median / self.unit, lower / self.unit, upper / self.unit, count
+        return inference.Spread(*units) if self.unit > 0.0 else NO_VALUES
+
+    @property
+    def body_queries(self) -> float:
+        """Expected pairs of shapes that are compared up to a proven answer."""
+        return self.queries * self.body_tests
 
 
 def page(
@@ -137,42 +157,6 @@ def problem_rows(runs: Sequence[PlannerRuns]) -> Iterator[tuple[str, ...]]:
         yield name, f"`{problem.key}`" if problem.key else "–", *lengths, unit
 
 
-def answer_rows(rated: Sequence[Rated], settings: ReportSettings) -> Iterator[tuple[object, ...]]:
-    """Yield each condition's proven answers: how many, their effort and their lengths."""
-    for row in rated:
-        median, lower, upper, count = row.lengths
-        in_units = inference.Spread(median / row.unit, lower / row.unit, upper / row.unit, count)
-        yield (
-            row.condition,
-            row.runs,
-            inference.Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
-            markdown.number(row.first_own),
-            f"{effort_text(row.queries)} ({' to '.join(map(effort_text, row.interval))})",
-            markdown.spread(row.lengths),
-            markdown.spread(in_units) if row.unit > 0.0 else "–",
-            f"{row.refuted} of {row.judged}" if row.judged else "–",
-        )
-
-
-def coin_rows(rated: Sequence[Rated]) -> Iterator[tuple[str, ...]]:
-    """Yield the effort of each condition that was run here, counted in other ways."""
-    for row in rated:
-        if row.own_cost.num_values:
-            yield (
-                row.condition,
-                markdown.number(row.body_tests),
-                effort_text(row.queries * row.body_tests),
-                effort_text(row.evaluations),
-                markdown.number(row.cpu_s),
-                markdown.spread(row.own_cost),
-            )
-
-
-def effort_text(queries: float) -> str:
-    """Return a number of collision queries as a whole number; inf and NaN as `markdown.number`."""
-    return markdown.number(round(queries) if np.isfinite(queries) else queries)
-
-
 def compared_lengths(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
@@ -207,7 +191,7 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
     answers = [
         (
             *(row.planner, row.problem, row.runs, row.proven, row.queries, *row.interval),
-            *(*row.lengths[:3], row.queries * row.body_tests, row.evaluations, row.cpu_s),
+            *(*row.lengths[:3], row.body_queries, row.evaluations, row.cpu_s),
         )
         for row in rows
     ]

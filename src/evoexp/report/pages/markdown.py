@@ -75,10 +75,10 @@ def number(value: float) -> str:
 def filled(template: str, words: Any) -> str:
     """Fill in the words of a sentence: values by name, a mapping or a `Scope`.
 
-    `{x!n}` is written as `number` does, `{p!p}` as `p_value`, `{xs!d}` as the median of its values,
-    `{xs!m}` as that with quartiles, `{runs!i}` as a proportion with its interval at the level
-    `confidence`, its decimals behind a colon (`{runs!i:1}`). A method stands for what it returns:
-    `{xs.mean:.2f}`.
+    `{x!n}` is written as `number` does, `{x!w}` as a whole number, `{p!p}` as `p_value`, `{xs!d}`
+    as the median of its values, `{xs!m}` as that with quartiles, `{runs!i}` as a proportion with
+    its interval at the level `confidence`, its decimals behind a colon (`{runs!i:1}`). A method
+    stands for what it returns: `{xs.mean:.2f}`.
 
     Raises:
         KeyError: If a word is missing.
@@ -94,16 +94,18 @@ class Sentence(string.Formatter):
 
     def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:
         """Return the value of a dotted name."""
-        found, first = super().get_field(field_name, args, kwargs)
-        return (found() if "." in field_name and callable(found) else found), first
+        value, first = super().get_field(field_name, args, kwargs)
+        return (value() if "." in field_name and callable(value) else value), first
 
     def convert_field(self, value: Any, conversion: str | None) -> Any:
         """Return a value as the letter behind its exclamation mark asks."""
         if conversion == "i":
             return functools.partial(value.with_interval, self.words["confidence"])
         if conversion in ("d", "m"):
-            found = spread_of(value)
-            return number(found.median) if conversion == "d" else spread(found)
+            values = value if isinstance(value, Spread) else spread_of(value)
+            return number(values.median) if conversion == "d" else spread(values)
+        if conversion == "w":
+            return number(round(value) if math.isfinite(value) else value)
         if conversion in ("n", "p"):
             return (number if conversion == "n" else p_value)(float(value))
         return super().convert_field(value, conversion)

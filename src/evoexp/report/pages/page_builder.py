@@ -4,12 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, cast
 
-from evoexp.report.pages import page_parts, searched, swept
+from evoexp.report.pages import page_parts, sweeps
 from evoexp.report.pages.judged_claims import Headline, judged_as_written
 from evoexp.report.pages.page_file import PageFile, Scope, own_pages, read_page_file
 from evoexp.report.pages.page_parts import Claim, Drawing, Page, Quantity, Table, quantity
 from evoexp.report.pages.page_values import best_motions
-from evoexp.report.pages.swept import sweep_of
 from evoexp.report.report_settings import GENERIC, ReportSettings, page_registration
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import comparisons
@@ -25,11 +24,10 @@ def page_of(results: Results, settings: ReportSettings) -> Page:
     """Return the page that the settings name, filled from results; sweeps have their own."""
     chosen = page_registration(settings)
     if results.searched is not None:
-        motions = best_motions(searched.best_of(results))
-        given = {"searched": results.searched, "best_motions": motions}
-        return own_page("search", results, settings, **given)
-    if sweep := sweep_of(results):
-        motions = best_motions(swept.best_condition(sweep, results))
+        searched, motions = results.searched, best_motions(sweeps.best_of(results))
+        return own_page("search", results, settings, searched=searched, best_motions=motions)
+    if sweep := sweeps.sweep_of(results):
+        motions = best_motions(sweeps.best_condition(sweep, results))
         return own_page("sweep", results, settings, sweep=sweep, best_motions=motions)
     if chosen.target.endswith(".yaml"):
         page = build(read_page_file(*chosen.target.split(":")), chosen.name, results, settings)

@@ -17,6 +17,7 @@ import string
 import types
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import resources
+from pathlib import Path
 from typing import Any, NamedTuple, get_origin
 
 import yaml
@@ -157,34 +158,10 @@ def names_in(template: object) -> Iterator[str]:
 
 FIGURES = "evoexp.report.figures"  # those that papers share
 FILE, RULES_FILE = "page.yaml", "claims.yaml"
-_CLAIM = {"each", "when", "claim", "of", "than", "values", "better", "word", "words", "family"}
-_CLAIM |= {"elsewhere", "unjudged", "n", "planned", "by", "evidence"}
-KEYS: dict[str, set[str]] = {
-    "file": {"name", "functions", "values", "pages", "quantities", "tables", "checks", "figures"},
-    "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
-    | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
-    "claims": _CLAIM | {"judge"},
-    "judge": _CLAIM | {"judge"},
-    "comparisons": {"families", "measures", "controls", "pairs", "heading"},
-    "headlines": {"claim", "quantity", "values", "judge"},
-    "tables": {"heading", "headers", "behind", "each", "when", "cells", "row", "rows"} | {"note"},
-    "checks": {"title", "finding", "each", "when", "rows"},
-    "finding": {"each", "when", "text"},
-    "figures": {"title", "caption", "columns", "stem", "functions", "arguments", "options"}
-    | {"each", "when", "conditions", "plays", "shows", "kind", "of", "names", "words", "needs"}
-    | {"among"},
-}
+FORMAT = yaml.safe_load(Path(__file__).with_name("page_keys.yaml").read_text(encoding="utf-8"))
+KEYS: dict[str, list[str]] = FORMAT["keys"]
 _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
 _FIRST = re.compile(r"[.\[]")  # ends the first part of a name
-_NAMED = (
-    *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
-    *("plays", "shows", "n", "planned", "by", "pairs"),
-)
-_TEXTS = ("title", "introduction", "caption", "finding", "text", "stem", "note", "cells")
-BOUND = (
-    *("results", "settings", "rules", "paper", "page", "condition", "controls", "compared"),
-    *("shown", "of", "names"),  # in figures
-)
 
 
 class PageFile(NamedTuple):
@@ -272,7 +249,7 @@ def _check_keys(field: str, entry: Mapping[str, Any], kind: str) -> None:
 
 
 def _check(file: PageFile, field: str) -> None:
-    bound, uses = {*BOUND, *file.functions}, list[tuple[str, str, str]]()
+    bound, uses = {*FORMAT["bound"], *file.functions}, list[tuple[str, str, str]]()
     for section in sorted(KEYS.keys() & file.entries):
         for title, whole in file.entries[section].items():
             for path, entry in _mappings(f"{field}: {section}.{title}", whole, section):
@@ -320,11 +297,11 @@ def _mappings(path: str, entry: Any, kind: str) -> Iterator[tuple[str, Mapping[s
 
 def _names(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield (key, first part of a name) for the names that an entry uses."""
-    for key in _NAMED:
+    for key in FORMAT["names"]:
         for path in entry[key] if isinstance(entry.get(key), list) else (entry.get(key),):
             if isinstance(path, str):
                 yield key, _FIRST.split(path.removeprefix("not "))[0]
-    for key in _TEXTS:
+    for key in FORMAT["texts"]:
         yield from ((key, name) for text in _texts(entry.get(key)) for name in names_in(text))
 
 

@@ -133,14 +133,6 @@ def pairs_of_conditions(
             yield f"{name}: {of}", rows
 
 
-def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ...]]:
-    """Return shares of runs with intervals, a row per condition."""
-    return [
-        (c.label, *(of(c).with_interval(confidence) for of in SHARES.values()))
-        for c in results.with_data
-    ]
-
-
 def difference_rows(results: Results, confidence: float) -> Iterator[tuple[str, ...]]:
     """Yield how far shares differ from each other; no row of one that is the same everywhere."""
     for name, of in SHARES.items():
@@ -226,12 +218,10 @@ def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
 
 def notes(best_motions: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
     """Return (conditions, note): the notes on the conditions whose motions are shown."""
-    labels: dict[str, list[str]] = {}
-    for each in best_motions:
-        for note in each.condition.condition.notes():
-            own = labels.setdefault(note, [])
-            if each.condition.label not in own:
-                own.append(each.condition.label)
+    labels: dict[str, dict[str, None]] = {}  # note → labels of its conditions, in order
+    for condition, _ in best_motions:
+        for note in condition.condition.notes():
+            labels.setdefault(note, {})[condition.label] = None
     return tuple((", ".join(own), note) for note, own in labels.items())
 
 

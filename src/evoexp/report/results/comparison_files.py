@@ -14,7 +14,7 @@ import yaml
 from pydantic import Field
 
 import evoexp
-from evoexp.errors import SettingError, nearest, printable
+from evoexp.errors import SettingError, demand, demand_known, nearest, printable
 from evoexp.input_files import NUMBER, TableError, read_bounded, read_table
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
 from evoexp.validation import NonNegativeCount, Positive, Settings, construct
@@ -51,14 +51,12 @@ def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
         entries = yaml.safe_load(content) or {}
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise SettingError(name, "YAML", str(error).splitlines()[0]) from None
-    if not isinstance(entries, dict):
-        raise SettingError(name, "a mapping of keys of problems", entries)
+    demand(isinstance(entries, dict), name, "a mapping of keys of problems", entries)
     for key, entry in entries.items():
-        if not isinstance(key, str) or not re.fullmatch("[0-9a-f]{12}", key):
-            raise SettingError(name, "keys of 12 hex digits in quotation marks", key)
-        if not isinstance(entry, dict):
-            must = f"a mapping of {', '.join(BestKnown.model_fields)}"
-            raise SettingError(f"{name}, {key}", must, entry)
+        is_key = isinstance(key, str) and re.fullmatch("[0-9a-f]{12}", key)
+        demand(is_key, name, "keys of 12 hex digits in quotation marks", key)
+        must = f"a mapping of {', '.join(BestKnown.model_fields)}"
+        demand(isinstance(entry, dict), f"{name}, {key}", must, entry)
     return {key: construct(BestKnown, entry, f"{name}, {key}") for key, entry in entries.items()}
 
 
@@ -92,20 +90,17 @@ def read_given(path: str) -> GivenData:
     except TableError as error:
         raise SettingError(f"{name}, line {error.line}", error.must, error.was) from None
     columns = table[0].cells if table else []
+    where = f"{name}, line {table[0].line}" if table else ""
     for column in columns:
-        if column not in COLUMNS:
-            where, must = f"{name}, line {table[0].line}", f"the columns {', '.join(COLUMNS)}"
-            raise SettingError(where, must, column, nearest(column, COLUMNS))
+        demand_known(column, COLUMNS, where, f"the columns {', '.join(COLUMNS)}")
     for column in COLUMNS if table else ():
-        if (count := columns.count(column)) != 1:
-            where = f"{name}, line {table[0].line}, {column}"
-            raise SettingError(where, "there once", f"{count} times")
+        count = columns.count(column)
+        demand(count == 1, f"{where}, {column}", "there once", f"{count} times")
     rows = [
         _answer(f"{name}, line {line}", dict(zip(columns, cells, strict=True)))
         for line, cells in table[1:]
     ]
-    if not rows:
-        raise SettingError(name, "a file with a row per improvement of a run", "no row")
+    demand(rows, name, "a file with a row per improvement of a run", "no row")
     answers = pd.DataFrame(rows, columns=list(COLUMNS))
     return GivenData(name, hashlib.sha256(content).hexdigest(), answers)
 
@@ -113,21 +108,20 @@ def read_given(path: str) -> GivenData:
 def _answer(where: str, cells: dict[str, str]) -> tuple[str, str, int, int, float]:
     """Return the checked cells of a row in the order of `COLUMNS`."""
     for name in ("planner", "problem"):
-        if not cells[name] or not cells[name].isprintable():
-            raise SettingError(f"{where}, {name}", "a name", cells[name])
+        is_name = cells[name] and cells[name].isprintable()
+        demand(is_name, f"{where}, {name}", "a name", cells[name])
     counts = {}
     for name in ("seed", "queries"):  # whole numbers, which may be written as `1e3` or `12.0`
         value = Decimal(cells[name]) if NUMBER.fullmatch(cells[name]) else Decimal(-1)
-        if not 0 <= value < MOST or value != value.to_integral_value():
-            must = "a whole number, at least 0, of 18 digits at most"
-            raise SettingError(f"{where}, {name}", must, cells[name])
+        is_count = 0 <= value < MOST and value == value.to_integral_value()
+        must = "a whole number, at least 0, of 18 digits at most"
+        demand(is_count, f"{where}, {name}", must, cells[name])
         counts[name] = int(value)
     cost = math.nan
     if cells["cost"].lower() not in UNANSWERED:
         cost = float(cells["cost"]) if NUMBER.fullmatch(cells["cost"]) else math.nan
-        if not 0.0 < cost < math.inf:
-            must = "a length above 0, or empty or inf where the run has no answer"
-            raise SettingError(f"{where}, cost", must, cells["cost"])
+        must = "a length above 0, or empty or inf where the run has no answer"
+        demand(0.0 < cost < math.inf, f"{where}, cost", must, cells["cost"])
     return cells["planner"], cells["problem"], counts["seed"], counts["queries"], cost
 
 

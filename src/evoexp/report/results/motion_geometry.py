@@ -6,7 +6,6 @@ than one.
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -112,12 +111,14 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> Iterator[Floa
 
 
 class BodyDistance:
-    """Exact distances between bodies, by coal."""
+    """Exact distances between the bodies of a scene's pairs, by coal."""
 
-    def __init__(self, model: Any, geometry: Any) -> None:
-        """Take a `pin.Model`, and its `pin.GeometryModel` with the pairs that are looked at."""
-        self._model, self._geometry = model, geometry
-        self._data, self._placements = model.createData(), geometry.createData()
+    def __init__(self, scene: Scene) -> None:
+        self._model, self._geometry = scene.model, scene.geometry.copy()
+        self._geometry.removeAllCollisionPairs()
+        for one, two in scene.pairs:
+            self._geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
+        self._data, self._placements = self._model.createData(), self._geometry.createData()
 
     def nearest(self, q: FloatArray, pair: int | None = None) -> tuple[float, FloatArray]:
         """Return distance and nearest points (2, 3) of a pair of bodies at q (nq,) [rad].
@@ -133,16 +134,6 @@ class BodyDistance:
     def __call__(self, q: FloatArray) -> FloatArray:
         """Return the least distance at each configuration (nq, configurations) [rad]."""
         return np.array([self.nearest(each)[0] for each in np.ascontiguousarray(q.T)])
-
-
-def link_distance(assembly: Assembly) -> BodyDistance:
-    """Return the distances between links of different arms, on the robot's own geometry."""
-    geometry = assembly.geometry.copy()
-    for a, first in enumerate(assembly.links):
-        for b, second in enumerate(assembly.links[:a]):
-            if first.arm != second.arm:
-                geometry.addCollisionPair(pin.CollisionPair(b, a))
-    return BodyDistance(assembly.model, geometry)
 
 
 def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
@@ -185,7 +176,7 @@ def contact(
     motion = planner.motion(problem, solution)
     scene = next(p.scene for p in planner.parts(problem, motion) if p.first <= instant <= p.last)
     number = [PAIR.join(scene.pair_names(k)) for k in range(len(scene.pairs))].index(pair)
-    _, points = BodyDistance(scene.model, scene.geometry).nearest(motion.at(instant), number)
+    _, points = BodyDistance(scene).nearest(motion.at(instant), number)
     x, y, _ = np.mean(points, axis=0)
     return float(x), float(y)
 
@@ -210,6 +201,6 @@ def extremes(
     return at_lowest, at_highest
 
 
-def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:
+def distance_measure(scene: Scene) -> Measure:
     """Return a quick measure of a scene's least distance; coal where it alone knows bodies."""
-    return LeastDistance(scene) if known(scene) else exact
+    return LeastDistance(scene) if known(scene) else BodyDistance(scene)

@@ -19,7 +19,7 @@ from evoexp.papers import trails
 from evoexp.papers.chen.docking_postures import CLOSE, METHODS, Case
 from evoexp.papers.chen.figures import grid_paths
 from evoexp.planners.two_stage.planner import Problem
-from evoexp.report.figures import Parts, Rows, groups, marks, records, style, table_of
+from evoexp.report.figures import Rows, groups, marks, records, style, table_of
 from evoexp.report.pages import markdown
 from evoexp.report.results.run_measures import median_replicate
 from evoexp.report.results.stored_results import ConditionResults
@@ -64,8 +64,10 @@ def _colour(method: str) -> str:
     return style.condition_colour(ORDER.index(method)) if method in ORDER else style.NEUTRAL
 
 
-@table_of(is_rounded=True)
-def fitness_table(cases: list[Case]) -> Parts:
+@table_of(
+    "panel case quantity method generation median lower upper average runs optimum", is_rounded=True
+)
+def fitness_table(cases: list[Case]) -> Rows:
     """Return median and quartiles over runs of the best fitness f = E_m − E so far."""
     for panel, case in enumerate(cases):
         quantity, sign = "fitness f", -1.0
@@ -79,13 +81,10 @@ def fitness_table(cases: list[Case]) -> Parts:
                 for name in ("best_cost", "mean_cost")
                 for wide in (rows.pivot(index="index", columns="replicate", values=name),)
             )
-            columns: dict[str, Any] = {"panel": panel, "case": case.name, "quantity": quantity}
-            columns |= {"method": method, "generation": np.unique(rows["index"])}
-            spreads = quantiles(best, (0.5, 0.25, 0.75))
-            columns |= dict(zip(("median", "lower", "upper"), spreads, strict=True))
-            (columns["average"],) = quantiles(mean, (0.5,))
-            columns["runs"] = rows.groupby("index").size().to_numpy()
-            yield columns | {"optimum": offset + sign * case.least}
+            curve = panel, case.name, quantity, method, np.unique(rows["index"])
+            quartiles, (average,) = quantiles(best, (0.5, 0.25, 0.75)), quantiles(mean, (0.5,))
+            runs = rows.groupby("index").size().to_numpy()
+            yield *curve, *quartiles, average, runs, offset + sign * case.least
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
@@ -111,16 +110,15 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     return figure
 
 
-@table_of(is_rounded=True)
-def gaps_table(cases: list[Case]) -> Parts:
+@table_of("panel case method at gap", is_rounded=True)
+def gaps_table(cases: list[Case]) -> Rows:
     """Return the gap of every run, and of every start of a conventional method, to the optimum."""
     for panel, case in enumerate(cases):
         costs = {method: c.column("best_cost") for method, c in case.evolved.items()}
         costs |= {method: ends[:, 2] for method, ends in case.ends().items()}
         for method, values in costs.items():
-            columns: dict[str, Any] = {"panel": panel, "case": case.name, "method": method}
             gaps = np.maximum(case.gaps(values), 0.0)
-            yield columns | {"at": ORDER.index(method), "gap": gaps}
+            yield panel, case.name, method, ORDER.index(method), gaps
 
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
@@ -201,8 +199,8 @@ def draw_postures(table: pd.DataFrame) -> Figure:
     return figure
 
 
-@table_of(is_rounded=True)
-def landscape_table(cases: list[Case]) -> Parts:
+@table_of(" ".join(["panel case element", *ANGLES, "cost"]), is_rounded=True)
+def landscape_table(cases: list[Case]) -> Rows:
     """Return E over the angles, and the points that are marked."""
     for panel, case in enumerate(cases):
         assert case.landscape is not None
@@ -222,9 +220,7 @@ def landscape_table(cases: list[Case]) -> Parts:
             if len(angles)
         }
         for element, (angles, costs) in ({GRID: (grid, cost.ravel())} | marked).items():
-            columns: dict[str, Any] = {"panel": panel, "case": case.name, "element": element}
-            columns |= dict(zip(ANGLES, angles.T, strict=True))
-            yield columns | {"cost": costs}
+            yield panel, case.name, element, *angles.T, costs
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
-from evoexp.report.figures import Parts, Rows, groups, marks, style, table_of
+from evoexp.report.figures import Rows, groups, marks, style, table_of
 from evoexp.report.results.run_measures import solved
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
@@ -201,8 +201,11 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     return figure
 
 
-@table_of()
-def history_table(results: Results) -> Parts:
+@table_of(
+    "position condition phase order quantity cycle median lower upper begun running tolerance "
+    "length_unit"
+)
+def history_table(results: Results) -> Rows:
     """Return cost and distance of the best so far, per phase and cycle of the phase."""
     for position, c in enumerate(results.main):
         names = measures.phase_names(c)
@@ -212,14 +215,10 @@ def history_table(results: Results) -> Parts:
             for quantity, column in ((DISTANCE, "term_goal_distance"), (COST, "term_cost")):
                 wide = numbered.pivot(index="cycle", columns="replicate", values=column)
                 values = wide.abs().ffill().to_numpy(dtype=np.float64)
-                quartiles = quantiles(values, (0.5, 0.25, 0.75))
-                columns: dict[str, Any] = {"position": position, "condition": c.label}
-                columns |= {"phase": names[int(phase) - 1], "order": int(phase) - len(names)}
-                columns |= {"quantity": quantity, "cycle": wide.index}
-                columns |= dict(zip(("median", "lower", "upper"), quartiles, strict=True))
-                columns |= {"begun": wide.shape[1], "running": wide.notna().sum(axis=1).to_numpy()}
-                columns |= {"tolerance": measures.tolerances(c)[int(phase) - 1]}
-                yield columns | {"length_unit": c.length_unit}
+                curve = wide.index, *quantiles(values, (0.5, 0.25, 0.75))
+                runs = wide.shape[1], wide.notna().sum(axis=1).to_numpy()
+                of = position, c.label, names[int(phase) - 1], int(phase) - len(names), quantity
+                yield *of, *curve, *runs, measures.tolerances(c)[int(phase) - 1], c.length_unit
 
 
 def draw_history(table: pd.DataFrame) -> Figure:

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from evoexp.evolution.succession import pareto_front
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report.figures import Parts, groups, marks, style, table_of
+from evoexp.report.figures import Rows, groups, marks, style, table_of
 from evoexp.report.figures.side_by_side import draw_box
 from evoexp.report.pages.page_parts import Quantity
 from evoexp.report.results.run_measures import counted, grouped
@@ -45,13 +45,12 @@ DOMINATED, FRONT = style.ARM_COLOURS[:2]  # blue and red, as the paper draws the
 Fronts = dict[int, list[FrontRow]]  # replicate → front of each population
 
 
-@table_of()
-def costs_table(results: Results, threshold: float) -> Parts:
+@table_of("position condition replicate cost refuted threshold")
+def costs_table(results: Results, threshold: float) -> Rows:
     """Return every run's best cost."""
     for position, c in enumerate(results.with_data):
-        columns: dict[str, Any] = {"position": position, "condition": c.label}
-        columns |= {"replicate": c.summaries.index, "cost": c.column("best_cost")}
-        yield columns | {"refuted": measures.refuted(c) == 1.0, "threshold": threshold}
+        refuted = measures.refuted(c) == 1.0
+        yield position, c.label, c.summaries.index, c.column("best_cost"), refuted, threshold
 
 
 def draw_costs(table: pd.DataFrame) -> Figure:
@@ -201,8 +200,8 @@ def _rate(condition: ConditionResults) -> str:
     return "Eq. 10" if ga.mutation_decay else f"constant rate {ga.mutation_rate:g}"
 
 
-@table_of()
-def facet_table(results: Results, threshold: float) -> Parts:
+@table_of("panel title position name generation evaluations median reached reaching runs threshold")
+def facet_table(results: Results, threshold: float) -> Rows:
     """Return medians of the best cost so far, and shares of runs that have reached a cost."""
     names = dict[str, int]()
     for panel, (title, conditions) in enumerate(facets(results).items()):
@@ -214,12 +213,9 @@ def facet_table(results: Results, threshold: float) -> Parts:
                 quantiles(wide[each].to_numpy(np.float64), (0.5,)) for each in averaged
             )
             index = wide.index.to_numpy(np.float64)
-            columns: dict[str, Any] = {"panel": panel, "title": title}
-            columns |= {"position": names.setdefault(name, len(names)), "name": name}
-            columns |= {"generation": index, "evaluations": spent, "median": best}
-            columns |= {"reached": (first <= index[:, None]).mean(axis=1)}
-            columns |= {"reaching": int(np.isfinite(first).sum()), "runs": c.done}
-            yield columns | {"threshold": threshold}
+            reached, reaching = (first <= index[:, None]).mean(axis=1), np.isfinite(first).sum()
+            curve = panel, title, names.setdefault(name, len(names)), name, index, spent, best
+            yield *curve, reached, int(reaching), c.done, threshold
 
 
 def draw_facets(table: pd.DataFrame, column: str) -> Figure:
@@ -248,15 +244,16 @@ def draw_facets(table: pd.DataFrame, column: str) -> Figure:
     return figure
 
 
-@table_of(is_rounded=True)
-def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> Parts:
+@table_of(
+    f"generation population individual {' '.join(CRITERIA)} non_dominated replicate length_unit",
+    is_rounded=True,
+)
+def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> Rows:
     """Return the criteria of every individual of every population."""
     for front in fronts:
-        columns: dict[str, Any] = {"generation": front.generation, "population": front.population}
-        columns |= {"individual": np.arange(len(front.criteria))}
-        columns |= dict(zip(CRITERIA, front.criteria.T, strict=True))
-        columns |= {"non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T))}
-        yield columns | {"replicate": replicate, "length_unit": length_unit}
+        best = pareto_front(np.ascontiguousarray(front.criteria.T))
+        individuals = np.arange(len(front.criteria)), *front.criteria.T, best
+        yield front.generation, front.population, *individuals, replicate, length_unit
 
 
 def draw_fronts(table: pd.DataFrame) -> Figure:

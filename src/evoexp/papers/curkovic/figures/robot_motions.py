@@ -249,8 +249,8 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> P
     """Return the bodies' least distance: range over all motions, best replicate, straight line."""
     for position, c in enumerate(conditions):
         scene = c.problem(Problem).scene
-        distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
-        quick = motion_geometry.distance_measure(scene, distance)
+        distance = motion_geometry.BodyDistance(scene)
+        quick = motion_geometry.distance_measure(scene)
         sampled = partial(_sampled, c, samples=samples)
         lowest, highest = motion_geometry.extremes(list(c.solutions), sampled, quick)
         series = {LOWEST: lowest, HIGHEST: highest}

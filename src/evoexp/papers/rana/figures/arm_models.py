@@ -142,7 +142,9 @@ def circles_table(condition: ConditionResults) -> Iterator[tuple[object, ...]]:
     )
     a, b = min(couples, key=lambda ab: float(np.linalg.norm(ab[0] - ab[1])))
     yield "centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b)), *same
-    least, (a, b) = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
+    between, _ = measures.kinds_of_pairs(condition)[measures.BETWEEN_ARMS]
+    exact = motion_geometry.BodyDistance(problem.scene.of_pairs(between))
+    least, (a, b) = exact.nearest(DEGREE * at)
     yield "bodies", -1, *a[:2], *b[:2], np.nan, least, *same
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pinocchio as pin
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -17,7 +16,7 @@ from evoexp.papers.rana.figures.arm_models import links_table, path_table
 from evoexp.papers.rana.measures import STRAIGHT, TO_OBSTACLES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.figures import Parts, groups, marks, rounded, style, table_of
+from evoexp.report.figures import Parts, Rows, groups, marks, rounded, style, table_of
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import ConditionResults
 
@@ -175,8 +174,8 @@ def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = Fals
     return figure
 
 
-@table_of(is_rounded=True)
-def distances_table(condition: ConditionResults, samples: int) -> Parts:
+@table_of("measure series instant distance kind safety_distance length_unit", is_rounded=True)
+def distances_table(condition: ConditionResults, samples: int) -> Rows:
     """Return least distances along the best motion and the straight line, their range over all."""
     solutions, exact = condition.solutions, measures.approaches(condition)
     sampled = partial(measures.sampled, condition, samples=samples)
@@ -203,10 +202,8 @@ def distances_table(condition: ConditionResults, samples: int) -> Parts:
                 for name, at_name in ((CLOSEST, "clearance_at"), (REFUTED, "refuted_at")):
                     rows = own[own["refuted_at"].notna() == (name == REFUTED)]
                     series[name] = rows[at_name].to_numpy(), rows["clearance"].to_numpy()
-            for name, (instants, distances) in series.items():
-                columns: dict[str, Any] = {"measure": measure, "series": name}
-                columns |= {"instant": instants, "distance": distances, "kind": kind}
-                yield columns | {"safety_distance": margin, "length_unit": condition.length_unit}
+            for name, values in series.items():
+                yield measure, name, *values, kind, margin, condition.length_unit
 
 
 def _measures(
@@ -214,18 +211,11 @@ def _measures(
 ) -> dict[str, tuple[Measure, Measure]]:
     """Return measure → the exact one, and one as good and quick, of q (nq, instants) [deg]."""
     problem = condition.problem(Problem)
-    scene, bodies = problem.scene, motion_geometry.link_distance(problem.assembly)
-    centres = problem.centre_distances
-    if kind == TO_OBSTACLES:
-        geometry = scene.geometry.copy()
-        geometry.removeAllCollisionPairs()
-        for one, two in scene.pairs[pairs]:
-            geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
-        bodies = motion_geometry.BodyDistance(scene.model, geometry)
-        centres = problem.obstacle_distances
-    quick = motion_geometry.distance_measure(scene.of_pairs(pairs), bodies)
-    links = partial(_in_radians, bodies), partial(_in_radians, quick)
-    return {CENTRES: (centres, centres), LINKS: links}
+    to_obstacles, scene = kind == TO_OBSTACLES, problem.scene.of_pairs(pairs)
+    centres = problem.obstacle_distances if to_obstacles else problem.centre_distances
+    bodies = motion_geometry.BodyDistance(scene), motion_geometry.distance_measure(scene)
+    exactly, quickly = (partial(_in_radians, measure) for measure in bodies)
+    return {CENTRES: (centres, centres), LINKS: (exactly, quickly)}
 
 
 def _in_radians(measure: Measure, q: FloatArray) -> FloatArray:

@@ -209,7 +209,9 @@ ONE_OF_MANY = {  # conditions: tests/test_shipped.py runs every one of them
 def shortened(words: list[str]) -> list[str]:
     """Return a command with which a long run is over in seconds."""
     words = [*words, "sweep.num_trials=1"] if "sweep=optuna" in words else words
-    is_short = "experiment=rana_planar" in words or ("-m" in words and not {*words} & {*ONE_OF_MANY})
+    is_short = "experiment=rana_planar" in words or (
+        "-m" in words and not {*words} & {*ONE_OF_MANY}
+    )
     is_long = words[0] == "run" and not is_short
     if is_long and not any(word.startswith("budget=") for word in words):
         names = [ONE_OF_MANY[word] for word in words if word in ONE_OF_MANY]

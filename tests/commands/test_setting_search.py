@@ -59,6 +59,31 @@ def test_a_search_goes_on_as_if_it_had_not_been_interrupted(evoexp: Evoexp, outp
     assert again.code == 0 and (report / "search.svg").read_bytes() == drawn
 
 
+def test_each_combination_is_one_trial_and_what_changes_later_is_told(
+    evoexp: Evoexp, outputs: Path
+) -> None:
+    words = ("experiment=rana_planar", "budget=smoke", "runner=serial", "ga.num_generations=40")
+    words += ("ga.num_elites=0,60", "sweep=optuna", "sweep.num_trials=9", "--only", "via-point GA")
+    assert "ga.num_elites: must be at most" in evoexp("run", *words).err
+    words += ("ga.population_size=50,70",)  # 60 elites go with one of these
+    said = evoexp("run", *words, *NO_REPORT)
+    lines = re.findall(r"^trial [1-9].* · (.*)$", said.out, re.M)
+    assert said.code == 0 and len(set(lines)) == len(lines) == 4, said
+    assert said.out.count("refused: ga.num_elites: must be at most") == 1
+    assert "trial 4 of 9 is the last: no other combination of values is left" in said.out
+    assert evoexp("run", *words, *NO_REPORT).out.count("trial ") == 2
+
+    def page() -> str:
+        assert evoexp("report", *words).code == 0
+        return next((outputs / "reports").glob("*/index.html")).read_text()
+
+    remark = "Trials whose runs have changed since the search learned from their scores: "
+    assert remark not in page()
+    for log in (outputs / "runs").rglob("0000.mcap"):
+        log.unlink()
+    assert remark in " ".join(page().split())
+
+
 def judged(runs: pd.DataFrame, own: pd.DataFrame) -> list[float]:
     proven = own[own["solved"] & (own["certified"] == True)]  # noqa: E712
     reference = (proven if len(proven) else own)["best_cost"].mean()

@@ -27,7 +27,7 @@ from evoexp.version import __version__
 AHEAD = 2  # tasks per worker that are sent before earlier ones come back
 POLL_S = 0.01  # [s] between looks for results of a cluster
 COUNT_S = 5.0  # [s] between counts of its workers
-SAY_S = 30.0  # [s] between two lines about them
+SAY_S = 30.0  # [s] between two lines about them; a scheduler that is silent so long is named
 DEATHS = 1  # of workers that a task may cause and still be tried again
 _ALONE = threading.Lock()  # a worker of several threads runs one replicate at a time
 
@@ -53,10 +53,12 @@ def cluster_fan_out(
     lost = distributed.CancelledError, distributed.comm.core.CommClosedError, ImportError
     # either is told below, in one line
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    place = f"at {printable(settings.address)}" if settings.address else "on this machine"
     with _client(distributed, settings) as client:
-        workers, replicates = ClusterWorkers(client, limits), Replicates(jobs, 1, limits)
+        workers, replicates = ClusterWorkers(client, place, limits), Replicates(jobs, 1, limits)
         sent: dict[str, tuple[list[Job]]] = {}  # by the key of the task
-        running: Any = distributed.as_completed(loop=client.loop)
+        with client.as_current():
+            running: Any = distributed.as_completed()
         while True:
             replicates.num_workers = num_workers = max(1, workers.number())
             while len(sent) < AHEAD * num_workers and (task := replicates.next_task(len(sent))):
@@ -71,14 +73,15 @@ def cluster_fan_out(
                 continue
             future = next(running)
             try:
-                end = future.result()
+                with workers.patience():
+                    end = future.result()
             except distributed.scheduler.KilledWorker:
                 end = Died(0.0)  # the scheduler does not tell when it began
             except lost as error:
                 reason = printable(str(error).splitlines()[0])
                 must = f"a worker cannot run evoexp: {reason}"
                 if isinstance(error, OSError) or "scheduler-" in reason:  # connection-lost, restart
-                    must = f"the scheduler at {workers.address} went away; {kept}"
+                    must = f"the scheduler {place} went away; {kept}"
                 raise ClusterError(f"runner.address: {must}") from None
             finally:
                 future.release()
@@ -89,42 +92,53 @@ def cluster_fan_out(
 class ClusterWorkers:
     """Counts the workers of a cluster, which come and go, and says how many there are."""
 
-    def __init__(self, client: Any, limits: ReplicateLimits) -> None:
-        self.address: str = client.scheduler.address
-        self._client, self._limits = client, limits
+    def __init__(self, client: Any, place: str, limits: ReplicateLimits) -> None:
+        self._client, self._place, self._limits = client, place, limits
         self._number, self._line = 0, ""  # counted last; said last
         self._counted_at = self._said_at = -math.inf  # [s]
 
     def number(self) -> int:
         """Return the number of workers, counted at most `COUNT_S` ago."""
-        now = time.monotonic()
-        if now - self._counted_at >= COUNT_S:
-            self._counted_at = now
-            with contextlib.suppress(OSError):  # the scheduler went away: the tasks tell
-                # what `client.scheduler_info` returns may hold no workers: it is also set meanwhile
-                info = self._client.sync(self._client.scheduler.identity, n_workers=-1)
-                self._number = len(info["workers"])
-                self._say(sum(not worker["nanny"] for worker in info["workers"].values()), now)
+        if time.monotonic() - self._counted_at >= COUNT_S:
+            with self.patience(), contextlib.suppress(OSError):  # it went away: the tasks tell
+                self._number = len(self._client.nthreads())
+                # distributed empties these now and then, until they are asked for again
+                workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
+                num_alone = sum(not worker["nanny"] for worker in workers)
+                line = f"{self._number} worker{'s' * (self._number != 1)}"
+                if not self._number:
+                    line = f"no workers at {time.strftime('%H:%M:%S')}, waiting for some"
+                if num_alone and self._limits.timeout_s is not None:
+                    line += (
+                        f"; {num_alone} have no nanny and are lost if runner.timeout_s ends them"
+                    )
+                self._say(line)
+            self._counted_at = time.monotonic()
         return self._number
 
-    def _say(self, num_alone: int, now: float) -> None:
-        line = f"{self._number} worker{'s' * (self._number != 1)}"
-        if not self._number:
-            line = f"no workers at {time.strftime('%H:%M:%S')}, waiting for some"
-        if num_alone and self._limits.timeout_s is not None:
-            line += f"; {num_alone} have no nanny and end for good if runner.timeout_s ends them"
+    @contextlib.contextmanager
+    def patience(self) -> Iterator[None]:
+        """Say it if the scheduler, which may be suspended, does not answer what the body asks."""
+        silence = f"the scheduler has not answered for {SAY_S:.0f} s, waiting for it"
+        timer = threading.Timer(SAY_S, self._say, [silence])
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def _say(self, line: str) -> None:
+        now = time.monotonic()
         if line != self._line and now - self._said_at >= SAY_S:
-            warnings.warn(f"cluster at {self.address}: {line}", Notice, stacklevel=2)
+            warnings.warn(f"cluster {self._place}: {line}", Notice, stacklevel=2)
             self._line, self._said_at = line, now
 
 
 def run_checked(code: str, jobs: Sequence[Job], limits: ReplicateLimits) -> list[Outcome]:
     """Run replicates in a worker of a cluster, if its code is that which asks for them."""
     if code != code_identity():
-        raise ClusterError(
-            f"runner.address: the worker on {socket.gethostname()} must have evoexp {code}, has "
-            f"{code_identity()}"
-        )
+        must = f"must have evoexp {code}, has {code_identity()}"
+        raise ClusterError(f"runner.address: the worker on {socket.gethostname()} {must}")
     with _ALONE:
         if limits.timeout_s is not None:  # no replicate is late because its worker compiles
             for job in one_of_each_kind(jobs):
@@ -152,7 +166,7 @@ def _client(distributed: Any, settings: RunnerSettings) -> Iterator[Any]:
     if settings.address is not None:
         try:
             client = distributed.Client(settings.address, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
+        except (OSError, ValueError) as error:
             reason = printable(str(error).splitlines()[0]) if str(error) else "no answer"
             must = "runner.address: must be the address of a scheduler that answers"
             raise ClusterError(f"{must}, was {printable(settings.address)} ({reason})") from None
@@ -166,7 +180,6 @@ def _client(distributed: Any, settings: RunnerSettings) -> Iterator[Any]:
         distributed.LocalCluster(
             n_workers=settings.num_workers,
             threads_per_worker=1,
-            processes=True,
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
         ) as cluster,

@@ -165,6 +165,8 @@ def run_trials(experiment: Experiment, runs: Runs, overrides: Sequence[str]) -> 
                 best = min(best, score)
                 told = f"score {score:.4g}, best {best:.4g}"
             say(f"trial {asked.trial.number} of {total}: {told} · {' '.join(typed(asked.trial))}")
+        if (count := len(search.finished)) < total:
+            say(f"trial {count} of {total} is the last: no other combination of values is left")
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:

@@ -11,7 +11,7 @@ import functools
 import hashlib
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -30,6 +30,7 @@ from evoexp.store.run_directory import outputs_root
 from evoexp.validation import Count, NonNegativeCount, Positive, Settings
 
 DIGITS = 4  # of a number that is proposed: as many as one types
+REPEATS = 10  # proposals that are known, after which one of the unknown ones is drawn
 REFUSED = "refused"  # attribute of a trial whose settings do not go together: why
 FEWEST = 10  # trials from which on the importance of settings is told
 BEST = 5  # trials that are told from all others for it, a tenth of many (Optuna's advice)
@@ -72,6 +73,8 @@ class Search:
     ) -> None:
         """Try the ends and a middle of every setting; the study need not be there.
 
+        Each must go with the experiment as it is, or with a value of another searched setting.
+
         Args:
             settings: How to search.
             space: Searched overrides by key, each with its values or its span.
@@ -87,19 +90,32 @@ class Search:
         self.journal = folder / "journal.log"
         self.num_replicates, self._build = num_replicates, build
         own = build({})
-        references = [built.condition.is_reference for built in own.values()]
-        self._own = [each.condition.id for each in own.values()]
-        probes = [{key: value} for key, override in space.items() for value in _probes(override)]
-        rows = [[each.condition.id for each in self._built(probe).values()] for probe in probes]
+        self._num_conditions = len(own)
+        probes = [(key, value) for key, override in space.items() for value in _probes(override)]
+        rows = list(filter(None, (self._probed(*each, probes) for each in probes)))
         self._changed = [
             k
-            for k, own_id in enumerate(self._own)
-            if not references[k] and any(row[k] != own_id for row in rows)
+            for k, each in enumerate(built.condition for built in own.values())
+            if not each.is_reference and any(row[k] != each.id for row in rows)
         ]
         if not self._changed:
             raise SettingError(SWEEP, "beside values that change a condition", " ".join(space))
         self.base = self._problems(own)
         self.first = Trial(0, {}, _ids(self.base))
+
+    def _probed(self, key: str, value: Value, probes: list[tuple[str, Value]]) -> tuple[str, ...]:
+        """Return the conditions of a value; none if it goes only with one of another setting."""
+        try:
+            return _ids(self._built({key: value}))
+        except SettingError as error:
+            for other, its in probes:
+                with contextlib.suppress(EvoexpError):
+                    if other != key and self._built({key: value, other: its}):
+                        return ()
+            override, hint = self.space[key], error.hint
+            if "whole" in error.must and override.span and override.span.step is None:
+                hint = f"; write int({override.typed})"
+            raise SettingError(error.field, error.must, error.was, hint) from None
 
     def _built(self, values: Mapping[str, Value]) -> dict[str, Built]:
         """Return all conditions under values of some settings."""
@@ -108,7 +124,7 @@ class Search:
             for key, value in values.items()
         }
         built = self._build(choice)
-        if values and len(built) != len(self._own):
+        if len(built) != self._num_conditions:
             must = "a setting in which the conditions of the experiment do not differ (see --only)"
             raise SettingError(next(iter(values)), must, ", ".join(v.text for v in values.values()))
         return built
@@ -121,8 +137,7 @@ class Search:
 
     def _problems(self, conditions: dict[str, Built]) -> dict[str, Built]:
         """Return the conditions that the searched settings change."""
-        every = list(conditions.items())
-        return dict(every[k] for k in self._changed)
+        return {key: each for k, (key, each) in enumerate(conditions.items()) if k in self._changed}
 
     def _texts(self, params: Mapping[str, Any]) -> dict[str, str]:
         return {key: _value(each, params[key]).text for key, each in self.space.items()}
@@ -133,9 +148,8 @@ class Search:
         return self._opened(optuna.load_study) if self.journal.exists() else None
 
     def _opened(self, study: Callable[..., Any], **how: bool) -> Any:
-        backend = JournalFileBackend(str(self.journal))
         try:
-            storage = JournalStorage(backend)
+            storage = JournalStorage(JournalFileBackend(str(self.journal)))
             return study(storage=storage, study_name=self.folder.name, **how)
         except KeyError:  # the journal has no whole line
             return None
@@ -153,33 +167,45 @@ class Search:
         self.folder.mkdir(parents=True, exist_ok=True)
         try:
             with FileLock(self.folder / ".lock", timeout=0):
-                self._cut()
+                if self.journal.exists():  # cut off a line that a process did not finish writing
+                    content = self.journal.read_bytes()
+                    os.truncate(self.journal, content.rfind(b"\n") + 1)
                 self.study = self._opened(optuna.create_study, load_if_exists=True)
-                for trial in self.study.get_trials(deepcopy=False):
-                    if not trial.state.is_finished():
-                        self.study.tell(trial.number, state=TrialState.FAIL)
+                for trial in self.study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
+                    self.study.tell(trial.number, state=TrialState.FAIL)
                 yield
         except Timeout:
             raise Busy(f"{self.folder}: another process goes on with this search now") from None
 
-    def _cut(self) -> None:
-        """Cut off a line of the journal that a process did not finish writing."""
-        if self.journal.exists():
-            content = self.journal.read_bytes()
-            os.truncate(self.journal, content.rfind(b"\n") + 1)
-
-    def _finished(self) -> list[Any]:
-        """Return the trials of the study that have a score, or were refused."""
+    @property
+    def finished(self) -> list[Any]:
+        """The trials of the study that have a score, or were refused."""
         states = TrialState.COMPLETE, TrialState.PRUNED
         return self.study.get_trials(deepcopy=False, states=states) if self.study else []
 
     def ask(self) -> Asked | None:
-        """Return the next trial; None if all are finished. A refused one is finished at once."""
-        number = len(self._finished()) + 1
-        if number > self.settings.num_trials:
+        """Return the next trial; None if all are finished, or no other combination is left.
+
+        A refused one is finished at once. A proposal of known values is given up.
+        """
+        known = [self._texts(trial.params) for trial in self.finished]
+        number = len(known) + 1
+        choices: dict[str, Any] = {key: _choices(each) for key, each in self.space.items()}
+        num_combinations = math.prod(map(len, choices.values()))  # 0: an interval of any numbers
+        if number > self.settings.num_trials or 0 < num_combinations < number:
             return None
-        self.study.sampler = self._sampler(number)
-        trial = self.study.ask({key: _distribution(each) for key, each in self.space.items()})
+        for attempt in range(REPEATS + 1):
+            if attempt == REPEATS and num_combinations:  # one of the unknown combinations
+                rng = np.random.default_rng((self.settings.seed, number))
+                drawn = self.finished[0].params
+                while self._texts(drawn) in known:
+                    drawn = {key: each[rng.integers(len(each))] for key, each in choices.items()}
+                self.study.enqueue_trial(drawn)
+            self.study.sampler = self._sampler(number, attempt)
+            trial = self.study.ask({key: _distribution(each) for key, each in self.space.items()})
+            if self._texts(trial.params) not in known or attempt == REPEATS:
+                break
+            self.study.tell(trial, state=TrialState.FAIL)
         try:
             own, conditions = self._trial(number, trial.params)
             for built in conditions.values():
@@ -190,9 +216,9 @@ class Search:
             return Asked(Trial(number, self._texts(trial.params), ()), {}, trial.number, str(error))
         return Asked(own, conditions, trial.number)
 
-    def _sampler(self, number: int) -> Any:
-        """Return a sampler whose proposal depends on nothing but finished trials and a number."""
-        seed = int(np.random.SeedSequence((self.settings.seed, number)).generate_state(1)[0])
+    def _sampler(self, *numbers: int) -> Any:
+        """Return a sampler whose proposal depends on nothing but finished trials and numbers."""
+        seed = int(np.random.SeedSequence((self.settings.seed, *numbers)).generate_state(1)[0])
         kinds = {"tpe": optuna.samplers.TPESampler, "random": optuna.samplers.RandomSampler}
         return kinds[self.settings.sampler](seed=seed)
 
@@ -201,8 +227,7 @@ class Search:
         trial, conditions = (asked.trial, asked.conditions) if asked else (self.first, {})
         labelled = [(k, built.condition) for k, built in [*self.base.items(), *conditions.items()]]
         found = gather(outputs_root(), labelled, self.num_replicates, self.folder.name, "", "")
-        searched = self._searched(*[trial] * bool(asked))
-        table = score_table(searched, {c.condition.id: c for c in found.conditions})
+        table = score_table(self._searched(*[trial] * bool(asked)), found.conditions)
         score = float(table.loc[table["trial"] == trial.number, "score"].mean())
         if asked:
             self.study.tell(asked.study_number, score)
@@ -211,12 +236,12 @@ class Search:
     @property
     def scores(self) -> list[float]:
         """The scores of the finished trials that were not refused."""
-        return [trial.value for trial in self._finished() if trial.value is not None]
+        return [trial.value for trial in self.finished if trial.value is not None]
 
     @functools.cached_property
     def stored(self) -> list[tuple[Trial, dict[str, Built]]]:
         """The trials that were finished when this was first asked for, with their conditions."""
-        finished = enumerate(self._finished(), 1)
+        finished = enumerate(self.finished, 1)
         return [self._trial(k, each.params) for k, each in finished if each.value is not None]
 
     @property
@@ -240,10 +265,10 @@ class Search:
         found = self._searched(*(trial for trial, _ in self.stored))
         refused = {
             " ".join(f"{key}={text}" for key, text in self._texts(trial.params).items()): reason
-            for trial in self._finished()
+            for trial in self.finished
             if (reason := trial.user_attrs.get(REFUSED))
         }
-        return found._replace(refused=refused, importance=self._importance())
+        return found._replace(refused=refused, importance=self._importance(), told=(*self.scores,))
 
     def _searched(self, *trials: Trial) -> Searched:
         shared = self.num_replicates, self.settings.unsolved
@@ -294,6 +319,14 @@ def _distribution(override: Override) -> Any:
     return distributions.FloatDistribution(**ends, step=span.step)
 
 
+def _choices(override: Override) -> Sequence[Any]:
+    """Return all that Optuna may propose of a setting; nothing: any number of an interval."""
+    span = override.span
+    if span is not None and span.is_interval:
+        return range(span.low, int(span.high) + 1) if isinstance(span.low, int) else ()
+    return [value.data if span else value.text for value in override.values]
+
+
 def _value(override: Override, proposed: Any) -> Value:
     """Return a proposed value as one would type it."""
     if override.span is None:
@@ -310,9 +343,6 @@ def _value(override: Override, proposed: Any) -> Value:
 def _probes(override: Override) -> Iterator[Value]:
     """Yield values of a setting: all that are listed, or the ends and a middle of a span."""
     yield from override.values
-    if (span := override.span) is not None:
+    if (span := override.span) is not None and span.is_interval:
         middle = math.sqrt(span.low * span.high) if span.is_log else (span.low + span.high) / 2.0
-        if isinstance(span.low, int):
-            yield _value(override, int(middle))
-        elif span.step is None:
-            yield _value(override, middle)
+        yield _value(override, int(middle) if isinstance(span.low, int) else middle)

@@ -11,7 +11,7 @@ least. The functions give what the pages `sweep` and `search` of `page.yaml` nam
 
 import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -224,6 +224,7 @@ class Searched(NamedTuple):
     unsolved: float  # score of a run without a proven answer
     refused: Mapping[str, str] = {}  # settings that do not go together → why
     importance: Mapping[str, float] = {}  # key → share for being among the best trials
+    told: tuple[float, ...] = ()  # scores that the search learned from, behind trial 0
 
 
 def _proven(condition: ConditionResults) -> np.ndarray:
@@ -233,7 +234,7 @@ def _proven(condition: ConditionResults) -> np.ndarray:
 
 
 @table_of("trial problem score proven runs queries")
-def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> Rows:
+def score_table(searched: Searched, conditions: Iterable[ConditionResults]) -> Rows:
     """Return the score of every trial on every problem.
 
     A run that is proven counts its cost, divided by the mean cost of the proven runs of trial 0 on
@@ -243,11 +244,12 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> Row
 
     Args:
         searched: Problems and trials.
-        runs: Results by the id of their condition.
+        conditions: Results of all their conditions.
 
     Returns:
         Columns trial, problem, score, proven (runs), runs (planned), queries (mean per run).
     """
+    runs = {each.condition.id: each for each in conditions}
     references = dict[str, float]()
     for trial in searched.trials:
         for problem, key in zip(searched.problems, trial.ids, strict=True):
@@ -259,8 +261,7 @@ def score_table(searched: Searched, runs: Mapping[str, ConditionResults]) -> Row
                 finite = costs if len(costs) else every[np.isfinite(every)]
                 references[problem] = float(finite.mean()) if len(finite) else np.inf
             reference = references[problem]
-            is_scale = 0.0 < reference < np.inf
-            ratios = costs / reference if is_scale else np.ones(len(costs))
+            ratios = costs / reference if 0.0 < reference < np.inf else np.ones(len(costs))
             ratios = np.clip(ratios, 0.0, searched.unsolved)
             missing = searched.num_replicates - len(costs)
             score = (ratios.sum() + searched.unsolved * missing) / searched.num_replicates
@@ -295,12 +296,14 @@ def best_trial(searched: Searched, trials: pd.DataFrame) -> Trial:
 
 def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) -> dict[str, object]:
     """Return the words of the page's texts."""
-    *others, last = [f"`{key}`" for key in searched.trials[-1].settings] or ["no setting"]
     rows = {row.trial: row for row in records(trials)}
     best, own = rows[best_trial.number], rows[0]
+    scores = zip(trials["trial"][1:], trials["score"][1:], searched.told, strict=True)
+    changed = [str(number) for number, score, told in scores if not np.isclose(score, told)]
     return {
         "count": len(searched.trials) - 1,
-        "settings": " and ".join([", ".join(others), last] if others else [last]),
+        "settings": " and ".join(map("`{}`".format, searched.trials[-1].settings)) or "no setting",
+        "changed": ", ".join(changed),
         "problems": f"{count} problems" if (count := len(searched.problems)) > 1 else "one problem",
         "replicates": searched.num_replicates,
         "unsolved": f"{searched.unsolved:g}",
@@ -314,8 +317,7 @@ def search_words(searched: Searched, best_trial: Trial, trials: pd.DataFrame) ->
 
 def best_trials(searched: Searched, trials: pd.DataFrame) -> Iterator[tuple[str, Any]]:
     """Yield words and row of each of the best trials, and of the experiment as it is."""
-    different = trials.drop_duplicates(["score", *searched.trials[-1].settings])
-    best = different.sort_values("score", kind="stable").head(MOST_ROWS)
+    best = trials.sort_values("score", kind="stable").head(MOST_ROWS)
     words = {trial.number: words_of(trial) for trial in searched.trials}
     for row in records(pd.concat([best, trials[:1]]).drop_duplicates("trial")):
         yield words[row.trial], row
@@ -331,8 +333,8 @@ def best_trial_by_problem(best_trial: Trial, search_scores: pd.DataFrame) -> Row
 def best_of(results: Results) -> Results:
     """Return the results of the best trial of a search alone."""
     searched: Searched = results.searched
-    scores = score_table(searched, {c.condition.id: c for c in results.conditions})
-    ids = best_trial(searched, trial_table(searched, scores)).ids
+    trials = trial_table(searched, score_table(searched, results.conditions))
+    ids = best_trial(searched, trials).ids
     return results._replace(conditions=tuple(c for c in results.with_data if c.condition.id in ids))
 
 
@@ -352,9 +354,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
         *["condition"] * bool(effects["base"].any()),
         *("setting", "value", "pairs", "change of the best cost", "better in"),
     ),
-    "search_scores": lambda searched, results: score_table(
-        searched, {c.condition.id: c for c in results.conditions}
-    ),
+    "search_scores": lambda searched, results: score_table(searched, results.conditions),
     "trials": lambda searched, search_scores: trial_table(searched, search_scores),
     "effort_differs": lambda trials: (
         trials["queries"].max() > MUCH_MORE * trials["queries"].iloc[0]

@@ -159,6 +159,20 @@ def test_panels_of_a_column_stay_as_wide_and_those_that_begin_a_line_have_number
     assert 0.6 * max(page) <= min(column)
 
 
+def test_many_rows_with_long_names_fit_a_page_in_a_column() -> None:
+    def many() -> Figure:
+        found, panels = style.panels(16.0, 2, sharey=True)
+        names = [
+            f"{k} is a condition with a name that has no room here, number {k}" for k in range(50)
+        ]
+        panels[0].set_yticks(range(50), names)
+        return found
+
+    figure = at_width(many, "column")
+    assert figure.get_figheight() <= 8.9 and min(w.get_fontsize() for w in words(figure)) >= 6.0
+    assert len({label.get_text() for label in figure.axes[0].get_yticklabels()}) == 50
+
+
 def test_titles_of_a_page_are_broken_where_they_would_reach_into_the_next_panel() -> None:
     first, second = of_grid(at_width(long_titles))
     (title,) = (w for w in words(first.figure) if "bodies" in w.get_text() and w.axes is first)

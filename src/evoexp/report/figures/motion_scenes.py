@@ -270,6 +270,8 @@ AROUND, ALONG = 14, 4  # pieces of a round surface around its axis, and of each 
 MOST_CORNERS = 150  # of a mesh, which is drawn by the hull of the corners farthest out
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, length 1
 LABEL_PAD = -7.0  # [pt] from the numbers along an axis in space to its name
+COLUMN_PAD = -3.5  # [pt] the same for z in a figure for a column
+COLUMN_ZOOM = 0.85  # [-] in a figure for a column, where numbers are large beside their panel
 NARROW = 0.6  # [-] of the longest side of a box, below which a side has few ticks
 PALE = (0.97, 0.97, 0.97, 1.0)  # behind shaded bodies
 DARKEST = 0.45  # [-] of a colour's brightness, where a surface is turned from the light
@@ -377,17 +379,17 @@ def space(
     most.
     """
     axes: Any = figure.add_subplot(*place, projection="3d")
-    sides = high - low + 2.0 * pad
+    sides, in_column = high - low + 2.0 * pad, figure.get_figwidth() < style.WIDTH
     for name, least, greatest in zip("xyz", low - pad, high + pad, strict=True):
         getattr(axes, f"set_{name}lim")(least, greatest)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=LABEL_PAD, fontsize=7)
-    axes.set_box_aspect(sides, zoom=zoom)
+        away = COLUMN_PAD if in_column and name == "z" else LABEL_PAD
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=away, fontsize=7)
+    axes.set_box_aspect(sides, zoom=COLUMN_ZOOM * zoom if in_column else zoom)
     axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
     axes.tick_params(labelsize=6, pad=-2)
-    for axis, is_narrow in zip(
-        (axes.xaxis, axes.yaxis, axes.zaxis), sides < NARROW * sides.max(), strict=True
-    ):
-        axis.set_major_locator(MaxNLocator(nbins=ticks[0] if is_narrow else ticks[1]))
+    have_few = in_column | (sides < NARROW * sides.max())
+    for axis, has_few in zip((axes.xaxis, axes.yaxis, axes.zaxis), have_few, strict=True):
+        axis.set_major_locator(MaxNLocator(nbins=ticks[0] if has_few else ticks[1]))
         axis.set_pane_color(PALE)
     axes.view_init(elev=view[0], azim=view[1])
     return axes

@@ -66,8 +66,10 @@ def draw_values(table: pd.DataFrame) -> Figure:
             place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "fontsize": 6.5}
             axes.annotate("never", (never, 1.0), ha="center", va="bottom", **place)
     counts = quantities[0][1].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
-    names = [
+    names = [  # the caption has the number of runs that all of them have
         f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})"
+        if counts.nunique().max() > 1 or failed
+        else labels[k]
         for k, n, failed in counts.itertuples()
     ]
     panels[0].set_yticks(list(counts.index), names)

@@ -2,15 +2,16 @@
 
 import io
 import logging
-import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from importlib import resources
 from itertools import pairwise
 from logging.handlers import BufferingHandler
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -37,7 +38,9 @@ DOTS: dict[str, Any] = {"mec": "white", "ms": 5, "clip_on": False}  # configurat
 THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 FEW_DECADES = 30.0  # [-] last over first number of an axis, below which powers of ten are few
 WIDTH = 7.2  # [inch] of a figure over the whole page
-SMALLEST_TEXT = 3.0  # [pt] of legends and texts that are too wide
+SMALLEST_TEXT = 6.0  # [pt] of legends and texts that are too wide
+NAMES = 0.42  # [-] of the width of a figure that names of rows may take
+LOWER = 1.3  # times as high as a page may panels be together, which then are made lower
 
 
 class _Scale(NamedTuple):
@@ -46,15 +49,16 @@ class _Scale(NamedTuple):
     width: float
     height: float
     text: float
+    highest: float  # [inch] of a figure
 
 
-_SCALES = {"page": _Scale(1.0, 1.0, 1.0), "column": _Scale(3.5 / WIDTH, 0.62, 0.8)}
+_SCALES = {"page": _Scale(1.0, 1.0, 1.0, np.inf), "column": _Scale(3.5 / WIDTH, 0.62, 0.8, 8.8)}
 _scale: ContextVar[_Scale] = ContextVar("_scale", default=_SCALES["page"])
 _SCALED = ("size", "labelpad", "handlelength", ".major.pad", "_pad", "linewidth")
 """Endings of the names of parameters that are sizes of text, or distances between parts."""
 
-_FONT = b"'DejaVu Sans'"  # as matplotlib names it in an SVG
-_FONTS = b"'DejaVu Sans', Verdana, sans-serif"  # Verdana's letters are as wide
+# as matplotlib names it in an SVG, and with Verdana, whose letters are as wide
+_FONT, _FONTS = b"'DejaVu Sans'", b"'DejaVu Sans', Verdana, sans-serif"
 
 # nothing that changes from one day, or one machine, to the next
 _METADATA: dict[str, dict[str, Any]] = {
@@ -125,8 +129,9 @@ def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes
     FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
     if engine := figure.get_layout_engine():
         engine.execute(figure)
-        if fit_texts(figure):  # what is broken into lines takes room from the others
-            engine.execute(figure)
+        for fit in (fit_names, fit_texts, fit_names):
+            if fit(figure):  # what is broken into lines takes room from the others
+                engine.execute(figure)
     figure.set_layout_engine(None)  # with "none" every file would be drawn twice
     images = {}
     for kind in formats:
@@ -139,21 +144,32 @@ def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes
 def figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure that arranges itself [inch]; one for a column is as wide as this."""
     scale = _scale.get()
-    size = min(width, WIDTH * scale.width), height * scale.height
+    size = min(width, WIDTH * scale.width), min(height * scale.height, scale.highest)
     return Figure(figsize=size, layout="constrained")
+
+
+def grid(
+    height: float, count: int = 1, per_line: int = 0, foot: float = 0.0
+) -> tuple[Figure, int, int]:
+    """Return a figure with room for some panels [inch], their lines, and panels on a line.
+
+    Side by side are `per_line` of them at most, 0: all; in a figure for a column half as many, or
+    as many as let it fit a page.
+    """
+    scale, most = _scale.get(), min(count, per_line or count)
+    columns = most if scale is _SCALES["page"] else -(-most // 2)
+    room = LOWER * scale.highest / scale.height - foot
+    while columns < most and height * -(-count // columns) > room:
+        columns += 1
+    lines = -(-count // columns)
+    return figure(height * lines + foot), lines, columns
 
 
 def panels(
     height: float, count: int = 1, per_line: int = 0, foot: float = 0.0, *, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with some panels, and the panels, line by line [inch].
-
-    Side by side are `per_line` of them at most, 0: all; half as many in a figure for a column.
-    """
-    columns = min(count, per_line or count)
-    columns = columns if _scale.get() is _SCALES["page"] else -(-columns // 2)
-    lines = -(-count // columns)
-    found = figure(height * lines + foot)
+    """Return a figure with some panels, and the panels, line by line, see `grid`."""
+    found, lines, columns = grid(height, count, per_line, foot)
     places = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
     for unused in places[count:]:
         unused.remove()
@@ -265,10 +281,48 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     keys_below(figure, list(handles.values()), columns)
 
 
-LEAST_LINE = 8  # [characters]
+LEAST_LINE, LINE = 8, 1.25  # [characters] of a broken text; height of a line over its letters'
 GAP = 6.0  # [pixel] between texts side by side
 MOST_STEPS = 4  # between the numbers along an axis whose numbers would touch
 TURNED = 60.0  # [deg] of names along an axis that would touch
+
+
+def _is_named(axis: Axis) -> bool:
+    return isinstance(axis.get_major_locator(), FixedLocator)
+
+
+def fit_names(figure: Figure) -> bool:
+    """Break names of rows that are too wide, let a figure grow for its rows; say if it changed.
+
+    Names that would make a figure too high for a page are shortened instead.
+    """
+    height, highest = figure.get_figheight(), _scale.get().highest
+    heights, is_broken = [height], False
+    for axes in figure.axes:
+        labels = axes.get_yticklabels()
+        if not labels or axes.get_subplotspec() is None or not _is_named(axes.yaxis):
+            continue
+        names = [label.get_text() for label in labels]
+        share = max(_length(label, False) for label in labels) / figure.bbox.width
+        if share > NAMES:
+            most = int(max(map(len, names)) * NAMES / share)
+            broken, short = ([cut(name, most) for name in names] for cut in (fill, shortened))
+            fits = height + _lacking(axes, broken) <= highest or len({*short}) < len({*names})
+            names, is_broken = broken if fits else short, True
+            axes.set_yticks(axes.get_yticks(), names)
+        heights.append(height + _lacking(axes, names))
+    figure.set_figheight(min(max(heights), max(highest, height)))
+    return is_broken or figure.get_figheight() > height
+
+
+def _lacking(axes: Axes, names: Sequence[str]) -> float:
+    """Return by how much a figure is too low for the names of a panel's rows [inch]."""
+    place, size = axes.get_subplotspec(), float(axes.yaxis.get_ticklabels()[0].get_fontsize())
+    rows = len(names) * (place.get_gridspec().nrows if place else 1)
+    low = axes.transData.transform([(0.0, row) for row in axes.get_yticks()])[:, 1]
+    apart = float(np.abs(np.diff(low)).min(initial=np.inf)) / axes.figure.dpi
+    lines = 1 + max(name.count("\n") for name in names)
+    return max(lines * LINE * size / 72.0 - apart, 0.0) * rows
 
 
 def fit_texts(figure: Figure) -> bool:
@@ -306,7 +360,7 @@ def _part_labels(axis: Axis) -> bool:
     """Let fewer numbers stand along a horizontal axis where they would touch; names are turned."""
     if not _touch(axis):
         return False
-    if isinstance(axis.get_major_locator(), FixedLocator):
+    if _is_named(axis):
         axis.set_tick_params(labelrotation=TURNED)
         for label in axis.get_ticklabels():
             label.set(horizontalalignment="right", rotation_mode="anchor")
@@ -331,13 +385,11 @@ def _break(text: Text, room: float, *, is_upright: bool = False) -> bool:
         return False
     lines = text.get_text().split("\n")
     width = max(LEAST_LINE, int(max(map(len, lines)) * room / size))
-    wrapped = (
-        textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False) for line in lines
-    )
+    wrapped = (fill(line, width, break_long_words=False, break_on_hyphens=False) for line in lines)
     text.set_text("\n".join(wrapped))
     points = float(text.get_fontsize())
     while _length(text, is_upright) > room and points > SMALLEST_TEXT:
-        points *= 0.95
+        points = max(0.95 * points, SMALLEST_TEXT)
         text.set_fontsize(points)
     return True
 

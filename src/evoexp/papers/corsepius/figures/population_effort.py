@@ -254,7 +254,9 @@ def draw_history(table: pd.DataFrame) -> Figure:
             for tolerance in sorted(set(rows["tolerance"][rows["tolerance"] >= VISIBLE])):
                 axes.axhline(tolerance, **TOLERANCE)
         axes.set_title(title, fontsize=8)
-        axes.set(xlabel="cycle of the phase", ylabel=label)
+        axes.set_ylabel(label)
+        if style.ends_column(axes, places):
+            axes.set_xlabel("cycle of the phase")
     colours = {name: style.condition_colour(k) for k, name in enumerate(names)}
     keys = [style.key(name.replace("_", " "), color=c) for name, c in colours.items()]
     if (table["tolerance"] >= VISIBLE).any():

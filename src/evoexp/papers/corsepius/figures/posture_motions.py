@@ -66,17 +66,16 @@ def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
     """Draw one panel per path or phase; where there are one or two, each from above, too."""
     panels, unit = list(groups(table, ["panel", "title"])), table["length_unit"].iloc[0]
     above = len(panels) <= FEW
-    columns = 2 if above else min(PER_LINE, len(panels))
-    lines = len(panels) if above else -(-len(panels) // columns)
-    figure = style.figure((3.1 if above else 2.6) * lines + 0.3)
+    size = (3.1, 2 * len(panels), 2) if above else (2.6, len(panels), PER_LINE)
+    figure, *places = style.grid(*size, 0.3)
     for k, ((_, title), rows) in enumerate(panels):
-        place = lines, columns, (2 if above else 1) * k + 1
+        place = *places, (2 if above else 1) * k + 1
         points = _points(table if same_scene else rows)
         axes = trails.space(figure, place, points, unit, zoom=0.92)
         axes.set_title(title, fontsize=8)
         _draw(axes, rows, "xyz")
         if above:
-            plane = figure.add_subplot(lines, 2, 2 * k + 2)
+            plane = figure.add_subplot(*places, 2 * k + 2)
             style.operational_axes(plane, unit)
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
@@ -271,8 +270,7 @@ def _box(problem: Problem, q: FloatArray, scopes: float) -> tuple[FloatArray, Fl
 
 def draw_trap(table: pd.DataFrame) -> Figure:
     """Draw the ways from above, distances along the paths, the landscape, and ways out."""
-    figure = style.figure(6.2)
-    (above, along), (land, escape) = figure.subplots(2, 2)
+    figure, (above, along, land, escape) = style.panels(3.1, 4, 2)
     tools, cells, escapes, obstacles, goal = (
         table[table["element"] == element] for element in (TOOL, CELL, ESCAPE, OBSTACLE, GOAL)
     )

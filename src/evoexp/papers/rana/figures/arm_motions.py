@@ -68,9 +68,8 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     if names == "xy":
         figure, panels = trails.planes(table, len(stages), 3)
     else:
-        lines = -(-len(stages) // 3)
-        figure = style.figure(2.1 * lines + 0.4)
-        places = ((lines, 3, k + 1) for k in range(len(stages)))
+        figure, lines, columns = style.grid(2.1, len(stages), 3, 0.4)
+        places = ((lines, columns, k + 1) for k in range(len(stages)))
         panels = [trails.space_of_links(figure, place, moving) for place in places]
     for axes, (stage, rows) in zip(panels, stages, strict=True):
         for _, outline in groups(obstacles, "link"):

@@ -67,15 +67,15 @@ def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
     panels, unit = list(groups(table, ["panel", "title"])), table["length_unit"].iloc[0]
     above = len(panels) <= FEW
     size = (3.1, 2 * len(panels), 2) if above else (2.6, len(panels), PER_LINE)
-    figure, *places = style.grid(*size, 0.3)
+    figure, lines, columns = style.grid(*size, 0.3)
     for k, ((_, title), rows) in enumerate(panels):
-        place = *places, (2 if above else 1) * k + 1
+        place = lines, columns, (2 if above else 1) * k + 1
         points = _points(table if same_scene else rows)
         axes = trails.space(figure, place, points, unit, zoom=0.92)
         axes.set_title(title, fontsize=8)
         _draw(axes, rows, "xyz")
         if above:
-            plane = figure.add_subplot(*places, 2 * k + 2)
+            plane = figure.add_subplot(lines, columns, 2 * k + 2)
             style.operational_axes(plane, unit)
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")

@@ -105,7 +105,7 @@ def test_chains_keep_what_a_step_and_a_local_search_make_cheaper() -> None:
 
 
 def test_noisy_trajectories_move_by_their_weighted_mean() -> None:
-    chosen = control("stomp", "ga.num_generations=15", "control.sensitivity=7")
+    chosen = control("stomp", "ga.num_generations=15", "control.sensitivity=7", "control.sigma=0.5")
     planner, problem = chosen.prepare()
     rng = np.random.default_rng(2)
     vectors = real_vectors(planner.planner, problem, planner.sample(problem, rng, 1000))

@@ -2,8 +2,9 @@
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from evoexp.errors import DamagedStore
@@ -42,29 +43,44 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def _write(path: Path, temporary: Path, content: bytes) -> None:
+    with _named(path), open(temporary, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Let errors of the system name a path: those of `write` and `fsync` name none."""
     try:
-        with open(temporary, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError as error:  # those of `write` and `fsync` name no file
+        yield
+    except OSError as error:
         error.filename = str(path)
         raise
 
 
 def sync_directory(path: Path) -> None:
-    """Make renames and new names in a directory durable."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    """Make renames and new names in a directory durable, where the system can open one."""
+    with suppress(PermissionError):  # Windows
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            with _named(path):
+                os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def is_temporary(name: str) -> bool:
     """Return whether a file's name, or the last part of its path, is one of a temporary file."""
     last = name.rsplit("/", 1)[-1]
     return last.startswith(".") and last.endswith(_SUFFIX)
+
+
+def remove_stale(directories: Iterable[Path]) -> None:
+    """Remove the temporary files that killed writers left; only for who holds the lock."""
+    for directory in directories:
+        for path in directory.glob(f".*{_SUFFIX}"):
+            path.unlink(missing_ok=True)
 
 
 def warn(text: str) -> None:

@@ -14,7 +14,7 @@ from filelock import FileLock, Timeout
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest, portable
 from evoexp.store import identity
-from evoexp.store.files import reason, sync_directory, warn, write_file, write_files
+from evoexp.store.files import reason, remove_stale, sync_directory, warn, write_file, write_files
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, DamagedFile, Plan
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
@@ -224,8 +224,8 @@ class RunDirectory:
     def lock(self) -> Iterator[None]:
         """Hold the run for writing; an operating-system lock that dies with its process.
 
-        The same object may lock again inside. `Busy` is raised where another process or object
-        holds the run.
+        The same object may lock again inside. Temporary files that a killed parent left are
+        removed. `Busy` is raised where another process or object holds the run.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         try:
@@ -234,6 +234,7 @@ class RunDirectory:
             text = f"run {self.hash12}: another process is writing it now ({self.path})"
             raise Busy(text) from None
         with held:
+            remove_stale((self.path, self.replicates))
             yield
 
     def is_being_written(self) -> bool:

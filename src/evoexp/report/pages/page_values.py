@@ -219,9 +219,9 @@ def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
 def notes(best_motions: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
     """Return (conditions, note): the notes on the conditions whose motions are shown."""
     labels: dict[str, dict[str, None]] = {}  # note → labels of its conditions, in order
-    for condition, _ in best_motions:
-        for note in condition.condition.notes():
-            labels.setdefault(note, {})[condition.label] = None
+    for motion in best_motions:
+        for note in motion.condition.condition.notes():
+            labels.setdefault(note, {})[motion.condition.label] = None
     return tuple((", ".join(own), note) for note, own in labels.items())
 
 

@@ -77,8 +77,8 @@ def test_a_killed_worker_loses_nothing_but_its_own_replicate(
     expected = {k: digest for k, digest in undisturbed.items() if k not in (7, 9)}
     assert digests(tmp_path / "outputs", faulty) == expected
     assert RunDirectory(tmp_path / "outputs", faulty.id).failed() == {7, 9}
-    fail("slow:0")  # ended with its worker: sleep hears no exception
-    assert failures(run(tmp_path / "late", (faulty, 1), **DASK, timeout_s=1.0)) == {0: died}
+    fail("slow:1")  # ended with its worker: sleep hears no exception
+    assert failures(run(tmp_path / "late", (faulty, 2), **DASK, timeout_s=5.0)) == {1: died}
 
 
 @pytest.mark.matrix

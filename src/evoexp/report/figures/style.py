@@ -281,7 +281,8 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     keys_below(figure, list(handles.values()), columns)
 
 
-LEAST_LINE, LINE = 8, 1.25  # [characters] of a broken text; height of a line over its letters'
+LEAST_LINE = 8  # [characters] of a line of a broken text
+LINE_HEIGHT = 1.25  # [-] in sizes of its letters
 GAP = 6.0  # [pixel] between texts side by side
 MOST_STEPS = 4  # between the numbers along an axis whose numbers would touch
 TURNED = 60.0  # [deg] of names along an axis that would touch
@@ -322,7 +323,7 @@ def _lacking(axes: Axes, names: Sequence[str]) -> float:
     low = axes.transData.transform([(0.0, row) for row in axes.get_yticks()])[:, 1]
     apart = float(np.abs(np.diff(low)).min(initial=np.inf)) / axes.figure.dpi
     lines = 1 + max(name.count("\n") for name in names)
-    return max(lines * LINE * size / 72.0 - apart, 0.0) * rows
+    return max(lines * LINE_HEIGHT * size / 72.0 - apart, 0.0) * rows
 
 
 def fit_texts(figure: Figure) -> bool:
